@@ -5,14 +5,16 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
-DISTRIBUTIONS := -e schemas -e tag_client -e 'service[cluster,evaluation,foxglove,mqtt,parquet,postgresql,ros2,s3]'
-PACKAGES := schemas/dropanchor_schemas tag_client/dropanchor_tag_client service/dropanchor_service
-PARALLEL := -n 4 --dist loadfile --no-loadscope-reorder
-PYPROJECTS := pyproject.toml constraints.txt schemas/pyproject.toml tag_client/pyproject.toml service/pyproject.toml
+DISTRIBUTIONS := -e schemas -e tag_client -e service/evaluation -e 'service[cluster,evaluation,foxglove,maps,mqtt,parquet,postgresql,ros2,s3]'
+PACKAGES := schemas/dropanchor_schemas tag_client/dropanchor_tag_client service/dropanchor_service service/evaluation/dropanchor_evaluation
+PARALLEL := -n 6 --dist loadfile --no-loadscope-reorder
+PYPROJECTS := pyproject.toml constraints.txt schemas/pyproject.toml tag_client/pyproject.toml service/pyproject.toml service/evaluation/pyproject.toml
+
+FAST_TESTS := -n 2 --dist worksteal -m 'not benchmark and not cluster and not installation and not outside and not long'
 
 RESULTS := service/docs/results
 
-.PHONY: help demo test test-cluster check bench results install kernels chromium mosquitto proxies postgresql clean
+.PHONY: help demo docs test test-cluster check bench results pictures install kernels chromium mosquitto proxies postgresql clean
 .DEFAULT_GOAL := help
 
 # Without compiled modules each of the hundreds of programs that the tests start would compile all of them again.
@@ -21,10 +23,14 @@ unexport PYTHONDONTWRITEBYTECODE
 help:
 	@echo 'make demo     start the service and simulated tags around one anchor, print the page address'
 	@echo 'make test     install what the tests need and run them all'
+	@echo 'make test FAST=1   the short ones that need no browser, no other process and no database'
 	@echo 'make check    format, lint, types, import rules, generated files, breaking changes, age of the results'
+	@echo 'make docs     the documentation as a site of static files, in build/docs; the service has it below /help'
 	@echo 'make bench    measure what the service costs, print it and write it into $(RESULTS)/performance.md'
 	@echo 'make test-cluster  upgrade a cluster, let each of its parts die, and write the silences into $(RESULTS)/cluster.md'
+	@echo 'make dist     build the release, twice, and see that it comes out the same; make test-dist installs it'
 	@echo 'make results  measure everything in $(RESULTS) again: hours, on a machine that does nothing else'
+	@echo 'make pictures photograph the page for the README, when make check says that the page has changed'
 	@echo 'make install  the set-up alone: a virtual environment in $(VENV)'
 
 install: $(STAMP)
@@ -41,6 +47,10 @@ $(STAMP): $(PYPROJECTS)
 
 demo: install
 	@exec $(BIN)/dropanchor demo $(DEMO)
+
+docs: install
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --config-file service/mkdocs.yml
+	@echo 'The pages are in build/docs: $(BIN)/python -m http.server --bind 127.0.0.1 --directory build/docs'
 
 kernels: install
 	@PYTHONPATH=tests $(BIN)/python -m support.kernel_cache
@@ -78,20 +88,22 @@ postgresql:
 		apt-get update -qq && apt-get install -y -qq postgresql >/dev/null; } || \
 		echo 'The tests with a database need the package postgresql: without it they are skipped.' >&2
 
-test: install chromium mosquitto proxies postgresql
-	@echo '== running all tests'
-	@$(BIN)/python -m pytest $(PARALLEL) $(PYTEST)
+test: install $(if $(FAST),,chromium mosquitto proxies postgresql)
+	@echo '== running $(if $(FAST),the fast,all) tests'
+	@$(BIN)/python -m pytest $(if $(FAST),$(FAST_TESTS),$(PARALLEL)) $(PYTEST)
 
 check: install
 	@$(BIN)/ruff format --check .
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy $(PACKAGES) tests
+	@PYTHONPATH=tests $(BIN)/python -m support.page_types
 	@$(BIN)/lint-imports --no-cache
 	@$(BIN)/python -m dropanchor_schemas.export --check
 	@$(BIN)/python -m dropanchor_service.api.export --check
 	@$(BIN)/python -m dropanchor_service.api.compatibility --check
-	@$(BIN)/python -m dropanchor_service.reference.export --check
-	@$(BIN)/python -m dropanchor_service.evaluation.results --check
+	@$(BIN)/python -m dropanchor_evaluation.reference.export --check
+	@$(BIN)/python -m dropanchor_evaluation.results --check
+	@PYTHONPATH=tests $(BIN)/python -m pictures --check
 
 bench: install chromium postgresql
 	@$(BIN)/python -m pytest tests/benchmarks -s -m '' $(PYTEST)
@@ -103,7 +115,21 @@ results: bench
 	@$(BIN)/dropanchor evaluate recordings --into $(RESULTS)/recordings.md $(EVALUATE)
 	@$(BIN)/dropanchor evaluate paper --into $(RESULTS)/paper.md $(EVALUATE)
 	@$(BIN)/dropanchor evaluate product --into $(RESULTS)/scenarios.md $(EVALUATE)
+	@$(BIN)/dropanchor evaluate ablate --into $(RESULTS)/ablation.md
 	@$(BIN)/dropanchor evaluate bounds --into $(RESULTS)/scenarios.md $(EVALUATE)
+
+pictures: install chromium
+	@PYTHONPATH=tests $(BIN)/python -m pictures
 
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+.PHONY: dist test-dist
+
+# A release in dist/, built twice to see that it comes out the same: deploy/release/README.md.
+dist: install
+	@PYTHONPATH=deploy $(BIN)/python -m release.build dist
+
+# Installs the wheels into an empty environment, compiles the estimator and looks at the page: minutes, and the network.
+test-dist: dist
+	@$(BIN)/python -m pytest tests/deploy/test_installation.py -s -m installation $(PYTEST)

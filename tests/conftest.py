@@ -8,9 +8,12 @@ import pytest
 from hypothesis import settings
 
 from support.kernel_cache import use_cache_of_these_sources
+from support.outside import is_long, is_outside
+from support.patience import be_patient_with_http
 from support.zenoh_router import free_endpoint, running_router
 
 use_cache_of_these_sources()
+be_patient_with_http()
 # A shell without job control makes what it starts in the background ignore Ctrl-C, and so would the programs of tests.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 settings.register_profile("dropanchor", deadline=None)  # test machines are slow at times
@@ -20,7 +23,13 @@ settings.load_profile("dropanchor")
 FIRST = ("benchmarks", "schemas", "tag_client")
 
 
+@pytest.hookimpl(tryfirst=True)  # before tests are deselected by their marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if is_outside(item):
+            item.add_marker(pytest.mark.outside)
+        if is_long(item):
+            item.add_marker(pytest.mark.long)
     items.sort(key=_rank)
 
 

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from dropanchor_schemas.pose import TrackingState
+from dropanchor_schemas.pose import Phrase, TrackingState
 from dropanchor_schemas.site import Anchor, Georeference, RemoteSettings, TagSettings
 from dropanchor_schemas.tag_health import Care, TagHealth
 
@@ -68,6 +68,7 @@ class TagStatus(_Answer):
         description="What an operator can do about rejected data, for example add a missing anchor to the site; empty "
         "if nothing needs to be done."
     )
+    hint_phrase: Phrase | None = Field(default=None, description="The hint by its code; null without one.")
     unknown_anchor: str | None = Field(
         description="An anchor that the tag ranges to although the site does not have it; null if there is none."
     )
@@ -124,6 +125,7 @@ class SamplesAcknowledged(_Answer):
         description="Tracking state of the tag, at most a second old; null before its first pose."
     )
     hint: str = Field(description="What a person can do about the state; empty when there is nothing to do.")
+    hint_phrase: Phrase | None = Field(default=None, description="The hint by its code; null without one.")
 
 
 class PhoneReadingsReceived(_Answer):
@@ -143,8 +145,8 @@ class TagList(_Answer):
     tags: list[TagStatus]
 
 
-class Newcomer(_Answer):
-    """A pending tag: it sends data, but the service has not admitted it."""
+class PendingTag(_Answer):
+    """A tag that waits: it sends data, but the service has not admitted it."""
 
     tag: str
     first_heard_ns: int = Field(description="UTC, ns.")
@@ -152,11 +154,18 @@ class Newcomer(_Answer):
     messages: int
 
 
-class NewcomerList(_Answer):
+class PendingTagList(_Answer):
     """The pending tags, most recently received first."""
 
     t_ns: int = Field(description="UTC, ns: the time of the answer.")
-    newcomers: list[Newcomer]
+    tags: list[PendingTag]
+
+
+class NewcomerList(_Answer):
+    """The same under the former name, until the next version."""
+
+    t_ns: int = Field(description="UTC, ns: the time of the answer.")
+    newcomers: list[PendingTag]
 
 
 class SiteSummary(_Answer):
@@ -207,6 +216,9 @@ class Health(_Answer):
         default_factory=list,
         description="Functions that fail while live poses still work, for example a history that cannot be written.",
     )
+    impaired_phrases: list[Phrase | None] = Field(
+        default_factory=list, description="Each entry of `impaired` by its code; null for one without."
+    )
 
 
 class InvalidPart(_Answer):
@@ -214,6 +226,7 @@ class InvalidPart(_Answer):
 
     location: str = Field(description="`body`, `query` or `path`, then the path to the value, joined by dots.")
     detail: str
+    detail_phrase: Phrase | None = Field(default=None, description="The detail by its code; null: it has none.")
 
 
 class Problem(_Answer):
@@ -223,6 +236,10 @@ class Problem(_Answer):
     title: str
     status: int
     detail: str
+    detail_phrase: Phrase | None = Field(default=None, description="The detail by its code; missing: it has none.")
     instance: str = Field(description="The path of the request.")
     errors: list[InvalidPart] | None = Field(default=None, description="The errors in the request, one per location.")
     reasons: list[str] | None = Field(default=None, description="Why the service is not ready.")
+    network: str | None = Field(
+        default=None, description="The network of receivers that an administrator can allow, so that the request works."
+    )

@@ -40,7 +40,7 @@ _ESCAPING = "1 to 64 printable characters. All characters except A-Z a-z 0-9 . _
 
 def document() -> dict[str, Any]:
     """Return the AsyncAPI 3.0 document, ready for JSON."""
-    channels = _channels_of_tags() | _channels_of_service()
+    channels = _channels_of_tags() | _channels_of_settings_and_poses() | _channels_of_service()
     return {
         "asyncapi": "3.0.0",
         "info": {
@@ -89,8 +89,8 @@ def _channels_of_tags() -> Channels:
     }
 
 
-def _channels_of_service() -> Channels:
-    """Return what the service sends and answers."""
+def _channels_of_settings_and_poses() -> Channels:
+    """Return what the service sends about tags, for them and for others."""
     return {
         "settings": (
             _readable(keys.settings_key("{site}", "{tag}")),
@@ -110,6 +110,12 @@ def _channels_of_service() -> Channels:
             "The poses of all tags in columns.",
             {"kind": "put", "put": "at most 10 Hz, while there is a subscriber"},
         ),
+    }
+
+
+def _channels_of_service() -> Channels:
+    """Return what else the service sends and answers."""
+    return {
         "event": (
             _readable(keys.event_key("{site}", "{tag}")),
             ["event"],

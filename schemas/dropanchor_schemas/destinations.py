@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat
 
 from dropanchor_schemas.events import Event, EventType
+from dropanchor_schemas.pose import Phrase
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Id, NumberOnly, StrictBool
 
 SECRET_PREFIX = "whsec_"
@@ -16,14 +18,21 @@ TOPIC = r"^([A-Za-z0-9._ /:-]|\{site\}|\{tag\}|\{type\})+$"
 
 def _require_address(text: str) -> str:
     if not re.fullmatch(ADDRESS, text):
-        raise ValueError(f"{text!r} is no address such as shift@example.com")
+        raise ValueError(say("no_address", "{text} is no address such as shift@example.com", text=repr(text)))
     return text
 
 
 def _require_topic(text: str) -> str:
     if not re.fullmatch(TOPIC, text):
         raise ValueError(
-            f"{text!r} is no topic such as yard/{{tag}}/event; {{site}}, {{tag}} and {{type}} are replaced"
+            say(
+                "no_topic",
+                "{text} is no topic such as yard/{tag}/event; {site}, {tag} and {type} are replaced",
+                text=repr(text),
+                tag="{tag}",
+                site="{site}",
+                type="{type}",
+            )
         )
     return text
 
@@ -113,6 +122,27 @@ class DestinationList(BaseModel):
     """The destinations of the site."""
 
     destinations: list[DestinationState]
+    unavailable: dict[str, str] = Field(
+        description="Types of destinations that cannot be made before the settings have what they need, each with what."
+    )
+    unavailable_phrases: dict[str, Phrase | None] = Field(
+        default={}, description="Each entry of `unavailable` by its code; null for one without."
+    )
+
+
+class ReceiverNetwork(BaseModel):
+    """A network inside whose machines may receive events."""
+
+    model_config = ConfigDict(frozen=True)
+
+    network: str = Field(description="The network, such as `192.168.1.0/24`.")
+    in_settings: bool = Field(description="Whether the settings allow it, so that it cannot be removed here.")
+
+
+class ReceiverNetworkList(BaseModel):
+    """The networks inside whose machines may receive events."""
+
+    networks: list[ReceiverNetwork]
 
 
 class DestinationTest(BaseModel):

@@ -17,7 +17,15 @@ class EventType(StrEnum):
     TAG_BATTERY_LOW = "dropanchor.tag.battery_low"
     TAG_LOST = "dropanchor.tag.lost"
     TAG_AMBIGUOUS = "dropanchor.tag.ambiguous"
+    EVENT_RETRACTED = "dropanchor.event.retracted"
     DESTINATION_TEST = "dropanchor.destination.test"
+
+
+class RetractionReason(StrEnum):
+    """Why an event is retracted: what was said about the start of the tag was wrong."""
+
+    START_DENIED = "start_denied"  # the ranges contradict it
+    START_TAKEN_BACK = "start_taken_back"  # an operator took it back
 
 
 class _Answer(BaseModel):
@@ -41,6 +49,18 @@ class EventData(_Answer):
     distance_m: float | None = Field(default=None, description="Distance of their estimated positions.")
     speed_mps: float | None = None
     battery_fraction: float | None = None
+    retracts: str | None = Field(
+        default=None,
+        description="`id` of an earlier event that is not true: treat it as if it had not happened. It was made from "
+        "where a person said that the tag is. `zone`, `rule`, `name` and `other_tag` are those of that event, and "
+        "`since_ns` is its `t_ns`.",
+    )
+    retracted_type: EventType | None = Field(default=None, description="`type` of the event that is retracted.")
+    reason: RetractionReason | None = Field(
+        default=None,
+        description="Why it is retracted: `start_denied`: the ranges contradict the start of the tag; "
+        "`start_taken_back`: an operator took it back.",
+    )
 
 
 class Event(_Answer):

@@ -48,11 +48,26 @@ class SpeedEvidence(_Answer):
     predicted_range_rate_mps: float | None = Field(description="Slope of the predictions of the same ranges.")
 
 
+class RangeErrors(_Answer):
+    """How much the ranges of the tag scatter, as learned from them; never less than what was told."""
+
+    white_m: float = Field(description="Standard deviation, m, of the error that is new in every range.")
+    lasting_m: float = Field(description="Standard deviation, m, of the error that lasts for seconds.")
+
+
 class SpeedTrack(_Answer):
     """Speeds of the last minute, in columns. In a very large fleet the history is shorter."""
 
     t_ns: list[int]
     speed_mps: list[float | None]
+
+
+class HeightTrack(_Answer):
+    """Heights of the last minute, in columns, as `z` and `z_std_m` of poses."""
+
+    t_ns: list[int]
+    z: list[float | None]
+    z_std_m: list[float | None]
 
 
 class Explanation(_Answer):
@@ -62,7 +77,12 @@ class Explanation(_Answer):
     hypotheses: list[Hypothesis] = Field(description="Where the tag may be, while it is ambiguous.")
     speed: SpeedEvidence
     speed_track: SpeedTrack
+    height_track: HeightTrack
     innovations: list[Innovation] = Field(description="The most recent innovations, oldest first.")
+    range_errors: RangeErrors | None = Field(
+        default=None,
+        description="How much its ranges scatter; null before any, and with an engine that does not learn it.",
+    )
     refused: int = Field(description="How many of these innovations were not fused.")
     samples: dict[str, int] = Field(description="Samples that the engine was given, by kind.")
     arrived: dict[str, int] = Field(default={}, description="Samples that arrived in readable messages, by kind.")

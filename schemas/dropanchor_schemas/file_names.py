@@ -1,6 +1,7 @@
 """File names of ids, made in one place. This module needs only the standard library, because tags import it."""
 
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_schemas.sentences import say
 
 MAX_FILE_NAME = 200
 """Characters. File systems allow 255 bytes; the rest is for a time, an ending, and what writers append."""
@@ -16,9 +17,24 @@ def file_name_of(identifier: str) -> str:
     """
     name = chunk_from_id(identifier)
     if len(name) > MAX_FILE_NAME:
-        raise InvalidKeyError(f"{identifier!r} is too long for the name of a file: escaped, it has {len(name)} bytes")
+        raise InvalidKeyError(
+            say(
+                "file_long",
+                "{id} is too long for the name of a file: escaped, it has {n} bytes",
+                id=repr(identifier),
+                n=len(name),
+            )
+        )
     if name.partition(".")[0].upper() in _DEVICES:
-        raise InvalidKeyError(f"{identifier!r} cannot name a file: on Windows it is a device. Choose another name")
+        raise InvalidKeyError(
+            say(
+                "file_device",
+                "{id} cannot name a file: on Windows it is a device. Choose another name",
+                id=repr(identifier),
+            )
+        )
     if name.endswith("."):
-        raise InvalidKeyError(f"{identifier!r} cannot name a file: on Windows the dot at its end is lost")
+        raise InvalidKeyError(
+            say("file_dot", "{id} cannot name a file: on Windows the dot at its end is lost", id=repr(identifier))
+        )
     return name

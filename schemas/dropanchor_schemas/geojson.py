@@ -16,8 +16,8 @@ class Point(_Answer):
     """A place on the earth."""
 
     type: Literal["Point"]
-    coordinates: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(
-        description="Longitude and latitude, degrees."
+    coordinates: Annotated[list[float], Field(min_length=2, max_length=3)] = Field(
+        description="Longitude and latitude, degrees; altitude, m, if the georeference has one."
     )
 
 

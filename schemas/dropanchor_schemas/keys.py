@@ -2,6 +2,8 @@
 
 from urllib.parse import quote, unquote
 
+from dropanchor_schemas.sentences import say
+
 PREFIX = "dropanchor/@v1"
 MAX_ID_LENGTH = 64
 NOT_IDS = (".", "..")
@@ -18,11 +20,17 @@ def chunk_from_id(identifier: str) -> str:
     if the id is empty, longer than 64 characters, `.` or `..`, or has characters that are not printable.
     """
     if not 0 < len(identifier) <= MAX_ID_LENGTH:
-        raise InvalidKeyError(f"an id has 1 to {MAX_ID_LENGTH} characters, this one has {len(identifier)}")
+        raise InvalidKeyError(
+            say(
+                "id_length", "an id has 1 to {most} characters, this one has {n}", most=MAX_ID_LENGTH, n=len(identifier)
+            )
+        )
     if not identifier.isprintable():
-        raise InvalidKeyError("an id holds printable characters only")
+        raise InvalidKeyError(say("id_printable", "an id holds printable characters only"))
     if identifier in NOT_IDS:
-        raise InvalidKeyError(f"{identifier!r} cannot be an id: in paths and addresses it stands for a folder")
+        raise InvalidKeyError(
+            say("id_dots", "{id} cannot be an id: in paths and addresses it stands for a folder", id=repr(identifier))
+        )
     return quote(identifier, safe="").replace("~", "%7E")
 
 
@@ -36,8 +44,12 @@ def refuse_pattern(identifier: str) -> None:
     """Raise InvalidKeyError if the id looks like a pattern for several tags, which settings do not support."""
     if "*" in identifier:
         raise InvalidKeyError(
-            f"{identifier!r} would be the id of one tag, not a pattern: there are no settings for all tags; give each "
-            "tag its own"
+            say(
+                "id_pattern",
+                "{id} would be the id of one tag, not a pattern: there are no settings for all tags; give "
+                "each tag its own",
+                id=repr(identifier),
+            )
         )
 
 
@@ -46,9 +58,16 @@ def id_from_chunk(chunk: str) -> str:
     try:
         identifier = unquote(chunk, errors="strict")
     except UnicodeDecodeError as error:
-        raise InvalidKeyError(f"{chunk!r} is not percent-escaped UTF-8") from error
+        raise InvalidKeyError(say("key_escapes", "{part} is not percent-escaped UTF-8", part=repr(chunk))) from error
     if chunk_from_id(identifier) != chunk:
-        raise InvalidKeyError(f"{chunk!r} is not in its one escaped form, {chunk_from_id(identifier)!r}")
+        raise InvalidKeyError(
+            say(
+                "key_form",
+                "{part} is not in its one escaped form, {right}",
+                part=repr(chunk),
+                right=repr(chunk_from_id(identifier)),
+            )
+        )
     return identifier
 
 
@@ -163,7 +182,9 @@ def _chunks(key: str) -> list[str]:
     """Return the chunks of a `…/tag/<tag>/<leaf>` key. Raises InvalidKeyError if the key has another form."""
     chunks = key.split("/")
     if len(chunks) != 6 or "/".join(chunks[:2]) != PREFIX or chunks[3] != "tag":
-        raise InvalidKeyError(f"{key!r} is not {PREFIX}/<site>/tag/<tag>/<leaf>")
+        raise InvalidKeyError(
+            say("key_shape", "{key} is not {prefix}/<site>/tag/<tag>/<leaf>", key=repr(key), prefix=PREFIX)
+        )
     return chunks
 
 

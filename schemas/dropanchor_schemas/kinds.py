@@ -57,7 +57,15 @@ class BearingSample(NamedTuple):
     std_rad: float = math.nan
 
 
-Sample = ImuSample | RangeSample | HeadingSample | BearingSample
+class PressureSample(NamedTuple):
+    """Pressure of the air at the tag, Pa. temperature_c: of that air, °C, NaN if unknown."""
+
+    t_ns: int
+    pressure_pa: float
+    temperature_c: float = math.nan
+
+
+Sample = ImuSample | RangeSample | HeadingSample | BearingSample | PressureSample
 
 
 class _Kind:
@@ -93,11 +101,12 @@ class ImuKind(_Kind):
 
 
 class ScalarKind(_Kind):
-    """A kind that measures one number. Its samples are: t_ns, the anchor if there is one, the value, its std.
+    """A kind that measures one number. Its samples are: t_ns, the anchor if there is one, the value, a second number.
 
-    description, meaning: of a sample and of its value, in the JSON Schema.
-    limits, std_limits: the least and the greatest value that a sensor can have measured, in the unit of the sample.
-    below, above: why a value outside the limits is rejected.
+    The second number may be unknown, NaN: the standard deviation of the value, or what its meaning depends on.
+    description, meaning, second_meaning: of a sample and of its two numbers, in the JSON Schema.
+    limits, second_limits: the least and the greatest value that a sensor can have measured, in the unit of the sample.
+    below, above, second_outside: why a number outside the limits is rejected.
     """
 
     def __init__(
@@ -109,17 +118,20 @@ class ScalarKind(_Kind):
         description: str,
         meaning: str,
         limits: tuple[float, float],
-        std_limits: tuple[float, float],
+        second_limits: tuple[float, float],
         below: Reason,
         above: Reason,
+        second_meaning: str = "Standard deviation; omit it if unknown.",
+        second_outside: Reason = Reason.STD_INVALID,
     ) -> None:
         super().__init__(name, field, sample)
         self.description, self.meaning = description, meaning
-        self.limits, self.std_limits = limits, std_limits
+        self.limits, self.second_limits = limits, second_limits
         self.below, self.above = below, above
+        self.second_meaning, self.second_outside = second_meaning, second_outside
 
     @cached_property
-    def std(self) -> str:
+    def second(self) -> str:
         return str(self.sample._fields[-1])
 
     @cached_property
@@ -148,7 +160,7 @@ SCALARS = (
         description="One two-way range to an anchor.",
         meaning="Slant range, m.",
         limits=(0.0, 3_000.0),  # UWB radios end far below
-        std_limits=(1e-3, 100.0),
+        second_limits=(1e-3, 100.0),
         below=Reason.RANGE_NEGATIVE,
         above=Reason.RANGE_ABSURD,
     ),
@@ -159,7 +171,7 @@ SCALARS = (
         description="A heading from the tag's platform, for example a robot or a phone.",
         meaning="Counter-clockwise from east, rad.",
         limits=_ANGLE,
-        std_limits=_ANGLE_STD,
+        second_limits=_ANGLE_STD,
         below=Reason.HEADING_ABSURD,
         above=Reason.HEADING_ABSURD,
     ),
@@ -170,9 +182,22 @@ SCALARS = (
         description="The bearing of the tag, seen from the anchor.",
         meaning="Counter-clockwise from east, rad.",
         limits=_ANGLE,
-        std_limits=_ANGLE_STD,
+        second_limits=_ANGLE_STD,
         below=Reason.BEARING_ABSURD,
         above=Reason.BEARING_ABSURD,
+    ),
+    ScalarKind(
+        "pressure",
+        "pressures",
+        PressureSample,
+        description="The pressure of the air at the tag, from a barometer.",
+        meaning="Pressure as measured, not reduced to sea level, Pa.",
+        limits=(30_000.0, 110_000.0),  # what barometers measure; hPa and kPa lie far below
+        second_limits=(-60.0, 85.0),  # °C
+        below=Reason.PRESSURE_NOT_PA,
+        above=Reason.PRESSURE_ABSURD,
+        second_meaning="Temperature of the air, °C; omit it if unknown.",
+        second_outside=Reason.TEMPERATURE_ABSURD,
     ),
 )
 KINDS: tuple[Kind, ...] = (IMU, *SCALARS)
@@ -197,6 +222,7 @@ class Frame:
         ranges: list[RangeSample] | None = None,
         headings: list[HeadingSample] | None = None,
         bearings: list[BearingSample] | None = None,
+        pressures: list[PressureSample] | None = None,
         sequence: int | None = None,
         boot_id: int | None = None,
         boot_clock: bool = False,
@@ -207,6 +233,7 @@ class Frame:
         self.ranges = [] if ranges is None else ranges
         self.headings = [] if headings is None else headings
         self.bearings = [] if bearings is None else bearings
+        self.pressures = [] if pressures is None else pressures
         self.sequence, self.boot_id = sequence, boot_id
         self.boot_clock, self.replay = boot_clock, replay
         self.anchor_names = {} if anchor_names is None else anchor_names

@@ -4,6 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
+from dropanchor_schemas.pose import Phrase
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Id, Label, Number, NumberOnly, StrictBool
 from dropanchor_schemas.zones import Coordinate
 
@@ -63,7 +65,7 @@ class Floor(_Edited):
     @model_validator(mode="after")
     def _top_is_above_bottom(self) -> "Floor":
         if self.top_m <= self.bottom_m:
-            raise ValueError("top_m must be above bottom_m")
+            raise ValueError(say("floor_order", "top_m must be above bottom_m"))
         return self
 
 
@@ -99,3 +101,4 @@ class UploadedPlanImage(BaseModel):
     pages: int = Field(ge=1, description="Pages of the file; 1 unless it is a PDF.")
     placement: Placement | None = Field(description="Where the image lies; null: align it by hand.")
     note: str = Field(description="What a person should know about the placement; may be empty.")
+    note_phrase: Phrase | None = Field(default=None, description="The note by its code; null without one.")

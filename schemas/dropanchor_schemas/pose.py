@@ -4,6 +4,8 @@ from enum import StrEnum
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from dropanchor_schemas.sentences import Sentence
+
 
 class TrackingState(StrEnum):
     """How far a pose can be trusted."""
@@ -42,8 +44,31 @@ class Frame(StrEnum):
     RELATIVE = "relative"
 
 
+class HeightSource(StrEnum):
+    """Where the height of a pose comes from: the settings of the tag, its barometer, or nowhere."""
+
+    TOLD = "told"
+    PRESSURE = "pressure"
+    UNKNOWN = "unknown"
+
+
 class _Answer(BaseModel):
     model_config = ConfigDict(frozen=True)
+
+
+class Phrase(_Answer):
+    """A sentence of the service by its code, for those who say it in words or a language of their own."""
+
+    code: str = Field(description="What is said. It stays the same when the wording of the sentence changes.")
+    values: dict[str, str] = Field(
+        description="What stands in the sentence, by name. A value that is a sentence, too, has its code at "
+        "`<name>.code` and its values at `<name>.<value>`."
+    )
+
+    @classmethod
+    def of(cls, text: str) -> "Phrase | None":
+        """Return the phrase of a text; None for one without a code."""
+        return cls(code=text.code, values=text.values) if isinstance(text, Sentence) else None
 
 
 class Ellipse(_Answer):
@@ -95,6 +120,7 @@ class Pose(_Answer):
     state: TrackingState
     reason: StateReason = Field(description="Machine-readable reason of the state.")
     hint: str = Field(description="What an operator can do about it; empty if nothing needs to be done.")
+    hint_phrase: Phrase | None = Field(default=None, description="The hint by its code; null without one.")
     frame: Frame = Field(
         description="`relative`: north is not known, so the place is known in a frame of the tag's own only. "
         "`relative_pose` holds it then, and all that depends on the site frame is null."
@@ -104,6 +130,17 @@ class Pose(_Answer):
     )
     x: float | None = Field(description="East, m; null while unknown.")
     y: float | None = Field(description="North, m; null while unknown.")
+    z: float | None = Field(default=None, description="Height along the anchors' z axis, m, as `z_source` tells it.")
+    z_std_m: float | None = Field(default=None, description="Standard deviation of z, m.")
+    z_source: HeightSource | None = Field(
+        default=None, description="`unknown`: the tag is set to `free` and sends no pressures. Null without z."
+    )
+    floor: str | None = Field(
+        default=None, description="The floor of the plans that is likeliest by z and z_std_m; null without one."
+    )
+    floor_probability: float | None = Field(
+        default=None, description="Of `floor`. Believe it above 0.9: height and floor may be unknown."
+    )
     heading_rad: float | None = Field(description="Counter-clockwise from east.")
     speed_mps: float | None
     yaw_rate_radps: float | None
@@ -117,6 +154,7 @@ class Pose(_Answer):
     hypotheses: list[Hypothesis] = []
     lat: float | None = Field(default=None, description="Degrees; null unless the site is georeferenced.")
     lon: float | None = None
+    alt_m: float | None = Field(default=None, description="z plus `alt_m` of the georeference; null without both.")
     online: bool = Field(
         description="Whether the tag's liveliness token is present, its WebSocket is open, or it has sent something "
         "over HTTP in the last 30 s."
@@ -172,12 +210,18 @@ class PoseFrame(_Answer):
     state: list[TrackingState]
     reason: list[StateReason]
     hint: list[str]
+    hint_phrase: list[Phrase | None] = Field(default=[], description="As in a pose.")
     frame: list[Frame]
     relative_pose: list[RelativePose | None] = Field(description="As in a pose.")
     anchor: list[str | None]
     age_s: list[float]
     x: list[float | None]
     y: list[float | None]
+    z: list[float | None]
+    z_std_m: list[float | None]
+    z_source: list[HeightSource | None]
+    floor: list[str | None]
+    floor_probability: list[float | None]
     heading_rad: list[float | None]
     speed_mps: list[float | None]
     yaw_rate_radps: list[float | None]

@@ -35,7 +35,7 @@ class Reason(StrEnum):
     DUPLICATE = "duplicate"
     KEY_INVALID = "key_invalid"
     TAG_UNKNOWN = "tag_unknown"
-    TAG_UNPROVEN = "tag_unproven"
+    TAG_UNCONFIRMED = "tag_unconfirmed"
     TAG_QUARANTINED = "tag_quarantined"
     TAGS_FULL = "tags_full"
     SHED = "shed"
@@ -44,6 +44,10 @@ class Reason(StrEnum):
     TIME_REPEATED = "time_repeated"
     IMU_STUCK = "imu_stuck"
     SENSOR_FAULT = "sensor_fault"
+    PRESSURE_NOT_PA = "pressure_not_pa"
+    PRESSURE_ABSURD = "pressure_absurd"
+    TEMPERATURE_ABSURD = "temperature_absurd"
+    PRESSURE_DOUBTED = "pressure_doubted"
 
 
 class Explanation(NamedTuple):
@@ -91,7 +95,7 @@ REASONS_EXPLAINED: dict[Reason, Explanation] = {
     Reason.DUPLICATE: Explanation("message", "this sequence of this boot id was already used"),
     Reason.KEY_INVALID: Explanation("message", "the key does not follow this contract"),
     Reason.TAG_UNKNOWN: Explanation("message", "the service admits registered tags only"),
-    Reason.TAG_UNPROVEN: Explanation(
+    Reason.TAG_UNCONFIRMED: Explanation(
         "message", "there are many new tags, and this one sent no second message before it was forgotten"
     ),
     Reason.TAG_QUARANTINED: Explanation("message", "the tag is new, and an operator has not admitted it yet"),
@@ -105,5 +109,13 @@ REASONS_EXPLAINED: dict[Reason, Explanation] = {
     Reason.IMU_STUCK: Explanation("sample", "the IMU repeats its last sample to the last bit"),
     Reason.SENSOR_FAULT: Explanation(
         "sample", "the sensor failed its check (units, axes, silence), as the tag's hint says"
+    ),
+    Reason.PRESSURE_NOT_PA: Explanation(
+        "sample", "a pressure below 30,000 Pa: about 1013 looks like hPa, about 101 like kPa; send Pa"
+    ),
+    Reason.PRESSURE_ABSURD: Explanation("sample", "a pressure above 110,000 Pa"),
+    Reason.TEMPERATURE_ABSURD: Explanation("sample", "a pressure with a temperature outside -60 to 85 °C"),
+    Reason.PRESSURE_DOUBTED: Explanation(
+        "sample", "a pressure that jumps: a door slams, or the tag is suddenly elsewhere, which two seconds will show"
     ),
 }

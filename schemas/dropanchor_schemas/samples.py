@@ -19,7 +19,6 @@ AnchorId = Annotated[
     Field(description='Anchor id: a number or a text. "7" and 7 name the same anchor.'),
 ]
 Vector = tuple[float, float, float]
-Std = Annotated[float | None, Field(description="Standard deviation; omit it if unknown.")]
 
 
 class _Message(BaseModel):
@@ -42,7 +41,7 @@ def _model_of(kind: ScalarKind) -> type[_Message]:
     if kind.has_anchor:
         fields["anchor"] = AnchorId
     fields[kind.value] = Annotated[float, Field(description=kind.meaning)]
-    fields[kind.std] = (Std, None)
+    fields[kind.second] = (Annotated[float | None, Field(description=kind.second_meaning)], None)
     return create_model(kind.name.capitalize(), __base__=_Message, __doc__=kind.description, **fields)
 
 
@@ -145,9 +144,9 @@ def _samples(kind: Kind, parsed: Sequence[Any]) -> list[Any]:
     if kind is IMU:
         return [ImuSample(*v) for v in values]
     if kind.has_anchor:
-        return [kind.sample(t_ns, anchor_number(anchor), value, _std(std)) for t_ns, anchor, value, std in values]
-    return [kind.sample(t_ns, value, _std(std)) for t_ns, value, std in values]
+        return [kind.sample(t_ns, anchor_number(anchor), *_known(*rest)) for t_ns, anchor, *rest in values]
+    return [kind.sample(t_ns, *_known(*rest)) for t_ns, *rest in values]
 
 
-def _std(std: float | None) -> float:
-    return math.nan if std is None else std
+def _known(value: float, second: float | None) -> tuple[float, float]:
+    return value, math.nan if second is None else second

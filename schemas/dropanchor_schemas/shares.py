@@ -4,6 +4,7 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Id, Label
 
 DAY_S = 86_400
@@ -30,7 +31,7 @@ class ShareRequest(BaseModel):
     @model_validator(mode="after")
     def _one_limit(self) -> Self:
         if self.tag is not None and self.group is not None:
-            raise ValueError("give a tag or a group, not both")
+            raise ValueError(say("share_both", "give a tag or a group, not both"))
         return self
 
 

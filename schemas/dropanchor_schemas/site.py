@@ -8,6 +8,7 @@ from pydantic.config import JsonDict
 from dropanchor_schemas.file_names import file_name_of
 from dropanchor_schemas.keys import checked_id
 from dropanchor_schemas.remote import MAX_BATCH_S, MAX_IMU_HZ, MIN_BATCH_S, MIN_IMU_HZ
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.wire import anchor_number
 
 
@@ -26,7 +27,7 @@ SiteId = Annotated[Id, AfterValidator(_names_files)]
 
 def _require_printable(text: str) -> str:
     if not text.isprintable():
-        raise ValueError("only printable characters are allowed")
+        raise ValueError(say("printable", "only printable characters are allowed"))
     return text
 
 
@@ -44,15 +45,15 @@ class Typed(str):
 
 def _reject_text_and_booleans(value: object) -> object:
     if isinstance(value, str) and not isinstance(value, Typed):
-        raise ValueError("a number was expected, not a text")
+        raise ValueError(say("number_not_text", "a number was expected, not a text"))
     if isinstance(value, bool):
-        raise ValueError("a number was expected, not true or false")
+        raise ValueError(say("number_not_truth", "a number was expected, not true or false"))
     return value
 
 
 def _require_boolean(value: object) -> object:
     if not isinstance(value, bool | Typed):
-        raise ValueError("true or false was expected")
+        raise ValueError(say("truth", "true or false was expected"))
     return value
 
 
@@ -90,6 +91,9 @@ class Georeference(_Settings):
     rotation_rad: Number = Field(
         default=0.0, description="Direction of the site's x axis, counter-clockwise from east."
     )
+    alt_m: Number | None = Field(
+        default=None, description="Altitude of the height 0 m; null: unknown, and exports have no altitudes."
+    )
 
 
 class StartPose(_Settings):
@@ -112,6 +116,12 @@ class TagSettings(_Settings):
     )
     group: Label = Field(default="", description="Group that lists and streams can select; empty: none.")
     height_m: Number = Field(default=0.0, description="Height of the tag's antenna, along the anchors' z axis.")
+    height_motion: Literal["auto", "flat", "free", "reference"] = Field(
+        default="auto",
+        description="What this height does; auto: it stays, or follows the tag's barometer once it sends pressures; "
+        "flat: it stays; free: it changes, and is unknown to 10 m without pressures; reference: it stays, and the "
+        "pressures of this tag take the weather out of those of the others.",
+    )
     range_std_m: Positive | None = Field(
         default=None, description="Standard deviation of one range; null: the engine's default."
     )
@@ -155,7 +165,8 @@ class TagSettings(_Settings):
     heading_std_rad: NotNegative | None = Field(
         default=None,
         description="Standard deviation of the constant or slowly varying error of a platform heading that does not "
-        "drift; 0: only noise; null: unknown, the heading may drift.",
+        "drift; 0: only noise; null: unknown, the heading may drift. With heading_source imu: how far the field where "
+        "the tag is turns north, beside the errors that the magnetometer shows; null: unknown.",
     )
     magnetometer_calibrated: StrictBool = Field(
         default=False,
@@ -211,6 +222,13 @@ class Site(_Settings):
         by_number: dict[int, str] = {}
         for anchor in self.anchors:
             if anchor.number in by_number:
-                raise ValueError(f"anchors {by_number[anchor.number]!r} and {anchor.id!r} share one number")
+                raise ValueError(
+                    say(
+                        "anchors_share",
+                        "anchors {one} and {other} share one number",
+                        one=repr(by_number[anchor.number]),
+                        other=repr(anchor.id),
+                    )
+                )
             by_number[anchor.number] = anchor.id
         return self

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from dropanchor_schemas.health import LIMITS, MAX_FIRMWARE_LENGTH, MAX_HEALTH_BYTES, is_absurd
+from dropanchor_schemas.pose import Phrase
 from dropanchor_schemas.samples import rejection_of, unknown_version
 from dropanchor_schemas.site import RemoteSettings
 from dropanchor_schemas.wire import ENCODING_JSON, Reason, Rejection
@@ -76,6 +77,7 @@ class Care(BaseModel):
 
     reason: Literal["sensor_fault", "battery_low", "firmware_differs", "spool_growing", "clock_offset", "no_contact"]
     hint: str
+    hint_phrase: Phrase | None = Field(default=None, description="The hint by its code; null without one.")
     setting: dict[str, str | bool] | None = Field(
         default=None, description="Setting of the tag that mends it, for a person to accept; null: none does."
     )

@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from dropanchor_schemas.pose import Frame, RelativePose, TrackingState
+from dropanchor_schemas.pose import Frame, HeightSource, RelativePose, TrackingState
 
 
 class _Answer(BaseModel):
@@ -22,6 +22,11 @@ class TrackPose(_Answer):
     )
     x: float | None = Field(description="East, m; null if it was unknown.")
     y: float | None = Field(description="North, m.")
+    z: float | None = Field(default=None, description="As in a pose; null if it was stored before heights were.")
+    z_std_m: float | None = Field(default=None, description="Standard deviation of z, m.")
+    z_source: HeightSource | None = None
+    floor: str | None = Field(default=None, description="As in a pose, by the current floors of the plans.")
+    floor_probability: float | None = None
     heading_rad: float | None
     speed_mps: float | None
     yaw_rate_radps: float | None
@@ -33,6 +38,7 @@ class TrackPose(_Answer):
     anchor: str | None
     lat: float | None = Field(default=None, description="Degrees, with the site's current georeference.")
     lon: float | None = None
+    alt_m: float | None = Field(default=None, description="z plus `alt_m` of the georeference; null without both.")
     epoch: int = Field(
         ge=0, description="Of the process that wrote the pose, as in a live pose; 0 where no cluster wrote it."
     )

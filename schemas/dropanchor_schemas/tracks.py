@@ -4,7 +4,7 @@ from enum import StrEnum
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from dropanchor_schemas.pose import Frame, RelativePose, TrackingState
+from dropanchor_schemas.pose import Frame, HeightSource, RelativePose, TrackingState
 
 
 class _Answer(BaseModel):
@@ -30,6 +30,11 @@ class TrackPoints(_Answer):
     )
     x: list[float | None] = Field(description="East, m.")
     y: list[float | None] = Field(description="North, m.")
+    z: list[float | None] = Field(description="Height, as in a pose, m; null if it was stored before heights were.")
+    z_std_m: list[float | None] = Field(description="Standard deviation of z, m.")
+    z_source: list[HeightSource | None]
+    floor: list[str | None] = Field(description="As in a pose, by the current floors of the plans.")
+    floor_probability: list[float | None]
     heading_rad: list[float | None]
     speed_mps: list[float | None]
     sigma_pos_m: list[float | None] = Field(description="One standard deviation of the position.")
@@ -75,3 +80,21 @@ class History(_Answer):
     enabled: bool = Field(description="Whether the service stores a history.")
     from_ns: int | None = Field(description="UTC, ns: the oldest pose is up to 10 s younger. Null without a pose.")
     to_ns: int | None = Field(description="UTC, ns: the newest pose is up to 10 s older.")
+
+
+class Stretch(_Answer):
+    """A time in which poses are stored."""
+
+    from_ns: int = Field(description="UTC, ns, inclusive.")
+    to_ns: int = Field(description="UTC, ns, exclusive.")
+
+
+class Coverage(_Answer):
+    """When poses of any tag are stored."""
+
+    from_ns: int | None = Field(
+        description="UTC, ns: start of the period. Null without a pose, if the request has none."
+    )
+    to_ns: int | None = Field(description="UTC, ns: end of the period. Null without a pose, if the request has none.")
+    step_ns: int = Field(description="Shorter gaps are not seen, ns.")
+    stretches: list[Stretch] = Field(description="In order of time.")

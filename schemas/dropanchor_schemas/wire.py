@@ -19,7 +19,10 @@ from dropanchor_schemas.kinds import (
     Frame,
     HeadingSample,
     ImuSample,
+    Kind,
+    PressureSample,
     RangeSample,
+    ScalarKind,
     Vector,
 )
 from dropanchor_schemas.rejections import Reason
@@ -40,6 +43,7 @@ __all__ = [
     "Header",
     "HeadingSample",
     "ImuSample",
+    "PressureSample",
     "RangeSample",
     "Reason",
     "Rejection",
@@ -184,7 +188,7 @@ def encode_json(frame: Frame) -> bytes:
         message["sequence"] = frame.sequence
     if frame.boot_id is not None:
         message["boot_id"] = frame.boot_id
-    message |= {kind.name: [_json_of(frame, s) for s in samples] for kind, samples in frame.by_kind() if samples}
+    message |= {kind.name: [_json_of(frame, kind, s) for s in samples] for kind, samples in frame.by_kind() if samples}
     return json.dumps(message, separators=(",", ":"), allow_nan=False).encode()
 
 
@@ -207,13 +211,11 @@ def _dt_us(t_ns: int, t0_ns: int) -> int:
     return (t_ns - t0_ns + 500) // 1000
 
 
-def _json_of(frame: Frame, sample: Any) -> dict[str, Any]:
+def _json_of(frame: Frame, kind: Kind, sample: Any) -> dict[str, Any]:
     """Return a sample as JSON has it: without unknown values, with the name of its anchor."""
-    values = {
-        name: value
-        for name, value in sample._asdict().items()
-        if value is not None and not (name.startswith("std_") and math.isnan(value))
-    }
+    values = {name: value for name, value in sample._asdict().items() if value is not None}
+    if isinstance(kind, ScalarKind) and math.isnan(values[kind.second]):
+        del values[kind.second]
     if "anchor" in values:
         values["anchor"] = frame.anchor_names.get(sample.anchor, sample.anchor)
     return values

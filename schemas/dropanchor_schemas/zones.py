@@ -2,8 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Id, Label, NumberOnly, StrictBool
 
 MAX_POINTS = 200
@@ -66,6 +67,17 @@ class Zone(Concerned):
         default=1.0,
         description="How long a tag must be inside or outside, or too fast, before the event.",
     )
+    z_min_m: Coordinate | None = Field(default=None, description="Lower end of its heights; null: there is none.")
+    z_max_m: Coordinate | None = Field(
+        default=None,
+        description="Upper end of its heights; null: there is none. A tag of unknown height enters none with an end.",
+    )
+
+    @model_validator(mode="after")
+    def _top_is_above_bottom(self) -> "Zone":
+        if self.z_min_m is not None and self.z_max_m is not None and self.z_max_m <= self.z_min_m:
+            raise ValueError(say("zone_heights", "z_max_m must be above z_min_m"))
+        return self
 
 
 class ZoneList(BaseModel):

@@ -33,12 +33,14 @@ _COMMANDS = {
     "ros2": "make a robot with ROS 2 a tag, and publish its pose to ROS",
     "evaluate": "run the experiments of the paper, or the engines on real recordings",
 }
+_OF_OTHERS = {"evaluate": "dropanchor_evaluation"}  # commands that another package brings by an entry point
 _DESCRIPTION = """\
 Live positions of a fleet of tags around one dropped UWB anchor.
 Tags publish raw ranges and IMU samples over Zenoh; the service provides their poses over Zenoh and REST.
 """
 _EXTRAS = {
     "apsw": "ros2",
+    "dropanchor_evaluation": "evaluation",
     "matplotlib": "evaluation",
     "scipy": "evaluation",
     "sympy": "evaluation",
@@ -94,7 +96,7 @@ def _parser(chosen: Container[str], words: Sequence[str] = ()) -> Parser:
         one = commands.add_parser(name, help=brief)
         if name in chosen:
             use_kernel_cache(partial(data_dir_of, words))  # before a command imports compiled kernels
-            command = _imported(_module(name))
+            command = _imported(name)
             one.description, one.epilog = command.DESCRIPTION, command.EPILOG
             command.add_arguments(one)
             one.set_defaults(run=command.run)
@@ -118,7 +120,7 @@ class _Version(argparse.Action):
 def _is_installed(command: str) -> bool:
     """Return whether the packages of a command are there: some commands need an extra."""
     try:
-        _imported(_module(command))
+        _imported(command)
     except ModuleNotFoundError as error:
         if error.name not in _EXTRAS:
             raise
@@ -126,19 +128,29 @@ def _is_installed(command: str) -> bool:
     return True
 
 
-def _module(command: str) -> str:
-    """Return the module of a command. One that is a keyword of Python has an underscore."""
-    return f"dropanchor_service.commands.{command}{'_' if iskeyword(command) else ''}"
+def _imported(command: str) -> ModuleType:
+    """Import the module of a command. A name that is a keyword of Python has an underscore there.
 
-
-def _imported(name: str) -> ModuleType:
-    """Import a module with the garbage collector off. Imported objects stay, and collecting costs 10 % of the start."""
+    The garbage collector is off meanwhile: imported objects stay, and collecting costs 10 % of the start.
+    """
     gc.disable()
     try:
-        return import_module(name)
+        if command in _OF_OTHERS:
+            return _of_another_package(command)
+        return import_module(f"dropanchor_service.commands.{command}{'_' if iskeyword(command) else ''}")
     finally:
         gc.freeze()
         gc.enable()
+
+
+def _of_another_package(command: str) -> ModuleType:
+    """Import a command that has an entry point. Raises ModuleNotFoundError where its package is not installed."""
+    from importlib.metadata import entry_points
+
+    for found in entry_points(group="dropanchor.commands", name=command):
+        module: ModuleType = found.load()
+        return module
+    raise ModuleNotFoundError(f"no package has the command {command}", name=_OF_OTHERS[command])
 
 
 def _with_negative_values(arguments: Sequence[str]) -> list[str]:

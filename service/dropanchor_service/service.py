@@ -38,7 +38,8 @@ from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.ownership.choose import ownership_of
 from dropanchor_service.ownership.processed import Processed
-from dropanchor_service.persistence import open_sites
+from dropanchor_service.persistence.site import open_sites
+from dropanchor_service.persistence.site_files import own_data_folder, put_site_files_in_place
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.runtime.supervision import Supervision
@@ -47,7 +48,6 @@ from dropanchor_service.serving import Serving
 from dropanchor_service.settings.http_url import http_url
 from dropanchor_service.settings.many_sites import refuse_too_many_sites
 from dropanchor_service.settings.model import Settings
-from dropanchor_service.site_files import own_data_folder, put_site_files_in_place
 from dropanchor_service.store import LatestPoses
 from dropanchor_service.store.shared import Shared
 from dropanchor_service.zenoh_io.caches import ZenohCaches

@@ -14,14 +14,14 @@ from dropanchor_service.api.routes.health import Ready
 from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.api.site_routers import SharedParts
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.persistence.site_folders import SiteFolders
+from dropanchor_service.persistence.zone_events import ZoneEvents
 from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.security.credentials import authenticator_of
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.settings.model import Settings
-from dropanchor_service.site_folders import SiteFolders
 from dropanchor_service.store import LatestPoses, Sites
 from dropanchor_service.zenoh_io.endpoints import endpoints_of
-from dropanchor_service.zone_events import ZoneEvents
 
 ReceiveOfSite = Callable[[str, str, bytes, str], None]
 """Takes a payload in as if it had come over Zenoh: the ids of site and tag, the payload, its encoding."""
@@ -63,16 +63,6 @@ class Serving:
         receive_health: ReceiveOfSite,
     ) -> FastAPI:
         """Return the application; see `create_app_of`."""
-        http = self._settings.http
-        shared = SharedParts(
-            stopping,
-            endpoints_of(self._settings.zenoh, self._credentials),
-            self._credentials,
-            self._authenticator,
-            RateLimiter(http.requests_per_s, http.burst),
-            self.border,
-            self.folders.basemap,
-        )
         parts = [
             SiteParts(
                 of_site,
@@ -88,4 +78,18 @@ class Serving:
                 self._sites, answers, self.folders.all, self.zone_events.parts, strict=True
             )
         ]
-        return create_app_of(parts, shared, ready=ready, impaired=impaired, registry=self._metrics.registry)
+        return create_app_of(
+            parts, self._shared(stopping), ready=ready, impaired=impaired, registry=self._metrics.registry
+        )
+
+    def _shared(self, stopping: Event) -> SharedParts:
+        http = self._settings.http
+        return SharedParts(
+            stopping,
+            endpoints_of(self._settings.zenoh, self._credentials),
+            self._credentials,
+            self._authenticator,
+            RateLimiter(http.requests_per_s, http.burst),
+            self.border,
+            self.folders.basemap,
+        )

@@ -30,7 +30,8 @@
 #define DROPANCHOR_RANGE_SIZE 16u
 #define DROPANCHOR_HEADING_SIZE 12u
 #define DROPANCHOR_BEARING_SIZE 16u
-/* Bytes of a payload with so many samples of each kind. */
+#define DROPANCHOR_PRESSURE_SIZE 12u
+/* Bytes of a payload with so many samples of each kind; add DROPANCHOR_PRESSURE_SIZE for every pressure. */
 #define DROPANCHOR_SIZE(imu, ranges, headings, bearings)                                                    \
     ((size_t)DROPANCHOR_HEADER_SIZE + (size_t)DROPANCHOR_IMU_SIZE * (imu) +                                 \
      (size_t)DROPANCHOR_RANGE_SIZE * (ranges) + (size_t)DROPANCHOR_HEADING_SIZE * (headings) +              \
@@ -62,6 +63,12 @@ typedef struct {
     float bearing_rad, std_rad;
 } dropanchor_bearing;
 
+/* Pressure of the air, Pa and not hPa. Its temperature, degrees Celsius; NAN is unknown. */
+typedef struct {
+    int64_t t_ns;
+    float pressure_pa, temperature_c;
+} dropanchor_pressure;
+
 /* The samples of one message. Times are UTC, or since the start of the tag with boot_clock. replay: of a recording, played
  * now. */
 typedef struct {
@@ -71,7 +78,8 @@ typedef struct {
     const dropanchor_range *ranges;
     const dropanchor_heading *headings;
     const dropanchor_bearing *bearings;
-    uint16_t imu_count, range_count, heading_count, bearing_count;
+    const dropanchor_pressure *pressures;
+    uint16_t imu_count, range_count, heading_count, bearing_count, pressure_count;
 } dropanchor_frame;
 
 /* What a payload holds. */
@@ -79,7 +87,7 @@ typedef struct {
     bool boot_clock, replay;
     uint32_t sequence, boot_id;
     int64_t t0_ns;
-    uint16_t imu_count, range_count, heading_count, bearing_count;
+    uint16_t imu_count, range_count, heading_count, bearing_count, pressure_count;
 } dropanchor_header;
 
 typedef enum {
@@ -142,6 +150,7 @@ static inline bool dropanchor_span_(const dropanchor_frame *f, int64_t *first_ns
     for (size_t i = 0; i < f->range_count; i++) good &= dropanchor_include_(f->ranges[i].t_ns, first_ns, last_ns);
     for (size_t i = 0; i < f->heading_count; i++) good &= dropanchor_include_(f->headings[i].t_ns, first_ns, last_ns);
     for (size_t i = 0; i < f->bearing_count; i++) good &= dropanchor_include_(f->bearings[i].t_ns, first_ns, last_ns);
+    for (size_t i = 0; i < f->pressure_count; i++) good &= dropanchor_include_(f->pressures[i].t_ns, first_ns, last_ns);
     return good;
 }
 
@@ -161,7 +170,8 @@ static inline void dropanchor_put_header_(uint8_t **at, const dropanchor_frame *
     dropanchor_put_(at, f->boot_id, 4);
     dropanchor_put_(at, (uint64_t)t0_ns, 8);
     dropanchor_put_(at, f->bearing_count, 2);
-    dropanchor_put_(at, 0, 6);
+    dropanchor_put_(at, f->pressure_count, 2);
+    dropanchor_put_(at, 0, 4);
 }
 
 static inline void dropanchor_put_imu_(uint8_t **at, const dropanchor_imu *sample, int64_t t0_ns) {
@@ -174,7 +184,8 @@ static inline void dropanchor_put_imu_(uint8_t **at, const dropanchor_imu *sampl
 /* Writes the payload of a frame and returns its size. Returns 0 and writes nothing when `out` is too small, the frame has
  * no samples, a time is out of range, the samples span more than 4,294 s, or the payload would exceed 65,536 bytes. */
 static inline size_t dropanchor_write(const dropanchor_frame *f, uint8_t *out, size_t capacity) {
-    const size_t size = DROPANCHOR_SIZE(f->imu_count, f->range_count, f->heading_count, f->bearing_count);
+    const size_t size = DROPANCHOR_SIZE(f->imu_count, f->range_count, f->heading_count, f->bearing_count) +
+                        (size_t)DROPANCHOR_PRESSURE_SIZE * f->pressure_count;
     int64_t t0_ns, last_ns;
     if (size == DROPANCHOR_HEADER_SIZE || size > capacity || size > DROPANCHOR_MAX_PAYLOAD) return 0;
     if (!dropanchor_span_(f, &t0_ns, &last_ns) || dropanchor_dt_us_(last_ns, t0_ns) > (int64_t)UINT32_MAX) return 0;
@@ -197,6 +208,11 @@ static inline size_t dropanchor_write(const dropanchor_frame *f, uint8_t *out, s
         dropanchor_put_(&at, f->bearings[i].anchor, 4);
         dropanchor_put_float_(&at, f->bearings[i].bearing_rad);
         dropanchor_put_float_(&at, f->bearings[i].std_rad);
+    }
+    for (size_t i = 0; i < f->pressure_count; i++) {
+        dropanchor_put_time_(&at, f->pressures[i].t_ns, t0_ns);
+        dropanchor_put_float_(&at, f->pressures[i].pressure_pa);
+        dropanchor_put_float_(&at, f->pressures[i].temperature_c);
     }
     return size;
 }
@@ -224,10 +240,12 @@ static inline dropanchor_reason dropanchor_read(const uint8_t *payload, size_t s
     const uint64_t t0_ns = dropanchor_get_(payload + 16, 8);
     header->t0_ns = (int64_t)(t0_ns & (uint64_t)INT64_MAX);
     header->bearing_count = (uint16_t)dropanchor_get_(payload + 24, 2);
+    header->pressure_count = (uint16_t)dropanchor_get_(payload + 26, 2);
     if ((payload[1] & ~(DROPANCHOR_BOOT_CLOCK | DROPANCHOR_REPLAY)) != 0) return DROPANCHOR_FLAGS_UNKNOWN;
-    if (!dropanchor_is_zero_(payload + 26, 6)) return DROPANCHOR_RESERVED_NOT_ZERO;
+    if (!dropanchor_is_zero_(payload + 28, 4)) return DROPANCHOR_RESERVED_NOT_ZERO;
     const dropanchor_header *h = header;
-    if (size != DROPANCHOR_SIZE(h->imu_count, h->range_count, h->heading_count, h->bearing_count))
+    if (size != DROPANCHOR_SIZE(h->imu_count, h->range_count, h->heading_count, h->bearing_count) +
+                    (size_t)DROPANCHOR_PRESSURE_SIZE * h->pressure_count)
         return DROPANCHOR_LENGTH_MISMATCH;
     if (size == DROPANCHOR_HEADER_SIZE) return DROPANCHOR_NO_SAMPLES;
     return t0_ns < UINT64_C(1) << 62 ? DROPANCHOR_OK : DROPANCHOR_TIME_OUT_OF_RANGE;
@@ -271,6 +289,14 @@ static inline dropanchor_bearing dropanchor_bearing_at(const uint8_t *payload, c
                                 .anchor = (uint32_t)dropanchor_get_(at + 4, 4),
                                 .bearing_rad = dropanchor_get_float_(at + 8),
                                 .std_rad = dropanchor_get_float_(at + 12)};
+}
+
+static inline dropanchor_pressure dropanchor_pressure_at(const uint8_t *payload, const dropanchor_header *h, size_t i) {
+    const size_t others = DROPANCHOR_SIZE(h->imu_count, h->range_count, h->heading_count, h->bearing_count);
+    const uint8_t *at = payload + others + DROPANCHOR_PRESSURE_SIZE * i;
+    return (dropanchor_pressure){.t_ns = dropanchor_time_(at, h),
+                                 .pressure_pa = dropanchor_get_float_(at + 4),
+                                 .temperature_c = dropanchor_get_float_(at + 8)};
 }
 
 /* The number that names an anchor: the id itself where it is a decimal below 2^32 in its shortest form, else the CRC-32

@@ -62,6 +62,7 @@ _PUBLISH_EXAMPLES = """a line is one sample:
   {"acc": [0, 0, 9.81], "gyro": [0, 0, 0.1], "mag": [0, 20, -44]}
   {"heading_rad": 1.57}
   {"anchor": 1, "bearing_rad": 0.3}
+  {"pressure_pa": 101325.0}
 or says something about the tag:
   {"battery_fraction": 0.83, "battery_v": 3.9, "temperature_c": 24.5, "rssi_dbm": -61, "firmware": "1.4.2"}
 or a samples message of the protocol:

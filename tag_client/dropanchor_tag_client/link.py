@@ -2,7 +2,6 @@
 
 import logging
 import threading
-import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple, Self
@@ -10,10 +9,11 @@ from typing import Any, NamedTuple, Self
 import zenoh
 
 from dropanchor_schemas import keys
+from dropanchor_tag_client.reminders import Reminders
 from dropanchor_tag_client.session import ConnectError, SessionSettings, open_session
 
 LOST_LINK_S = 12.0  # by then, a link that was cut without a word is known to be down: Zenoh's lease is 10 s at most
-_ATTEMPT_S, _LOG_EVERY_S = 1.0, 60.0
+_ATTEMPT_S = 1.0
 
 _log = logging.getLogger(__name__)
 
@@ -93,7 +93,7 @@ class Linker:
         self._lock = threading.Lock()
         self._link: Link | None = None
         self._closed = False
-        self._next_log_s = 0.0
+        self._reminders = Reminders()
         self._thread = threading.Thread(target=self._run, name=f"connect {tag_keys.samples}", daemon=True)
         self._thread.start()
 
@@ -132,9 +132,8 @@ class Linker:
         try:
             return open_session(self._connect, _ATTEMPT_S)
         except ConnectError as error:
-            if time.monotonic() >= self._next_log_s:
-                self._next_log_s = time.monotonic() + _LOG_EVERY_S
-                _log.warning("%s Still trying; messages go to the spool.", error)
+            if self._reminders.failed():
+                _log.warning("%s %s; messages go to the spool.", error, self._reminders.words)
             return None
 
 

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from operator import index
 
-from dropanchor_schemas.kinds import BearingSample, HeadingSample, ImuSample, RangeSample, Sample
+from dropanchor_schemas.kinds import BearingSample, HeadingSample, ImuSample, PressureSample, RangeSample, Sample
 from dropanchor_schemas.times import why_not_utc
 from dropanchor_tag_client.buffer import number_of, vector
 from dropanchor_tag_client.calibration import Calibration
@@ -55,6 +55,10 @@ class SampleMethods(ABC):
     ) -> None:
         """Publish the bearing of the tag, seen from the anchor, counter-clockwise from east, rad."""
         self._add(BearingSample(self._time(t_ns), number_of(anchor), float(bearing_rad), float(std_rad)), anchor)
+
+    def publish_pressure(self, pressure_pa: float, *, t_ns: int | None = None, temperature_c: float = math.nan) -> None:
+        """Publish the pressure of the air at the tag, Pa, as measured. temperature_c: of that air, °C."""
+        self._add(PressureSample(self._time(t_ns), float(pressure_pa), float(temperature_c)))
 
     def why_not_utc(self, t_ns: int) -> str | None:
         """Return what is wrong with a time, None if nothing is.

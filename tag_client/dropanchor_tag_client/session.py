@@ -9,10 +9,11 @@ from typing import Any
 
 import zenoh
 
+from dropanchor_tag_client.reminders import Reminders
+
 DEFAULT_CONNECT = "tcp/127.0.0.1:7447"
 _PROTOCOLS = ("tcp", "tls", "quic", "udp", "ws", "unixsock-stream")
 _FIRST_ATTEMPT_S, _ATTEMPT_S = 1.0, 5.0
-_LOG_EVERY_S = 10.0
 
 _log = logging.getLogger(__name__)
 
@@ -64,10 +65,10 @@ class SessionSettings:
 def open_session(settings: SessionSettings, timeout_s: float | None = None) -> zenoh.Session:
     """Return a connected session, which reconnects by itself without a limit.
 
-    Try for `timeout_s`, then raise ConnectError. With None, try without a limit and log a warning every 10 s.
+    Try for `timeout_s`, then raise ConnectError. With None, try without a limit, and log a warning ever more rarely.
     """
     deadline_s = math.inf if timeout_s is None else time.monotonic() + timeout_s
-    attempt_s, next_line_s = _FIRST_ATTEMPT_S, 0.0
+    attempt_s, reminders = _FIRST_ATTEMPT_S, Reminders()
     while True:
         left_s = min(attempt_s, deadline_s - time.monotonic())
         try:
@@ -75,9 +76,8 @@ def open_session(settings: SessionSettings, timeout_s: float | None = None) -> z
         except zenoh.ZError as error:
             if time.monotonic() + 0.01 >= deadline_s:
                 raise ConnectError(_what_to_check(settings)) from error
-        if time.monotonic() >= next_line_s:
-            next_line_s = time.monotonic() + _LOG_EVERY_S
-            _log.warning("%s Still trying.", _what_to_check(settings))
+        if reminders.failed():
+            _log.warning("%s %s.", _what_to_check(settings), reminders.words)
         attempt_s = _ATTEMPT_S
         time.sleep(0.1)  # some settings fail immediately, every time
 

@@ -20,14 +20,11 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     V,
 )
 from dropanchor_service.estimation.fleet.belief.predict import predict_covariance, predict_state
-from dropanchor_service.estimation.fleet.belief.update import (
-    predict_range,
-    project,
-    truncate_speed,
-    update_bearing,
-    update_heading,
-    update_range,
-)
+from dropanchor_service.estimation.fleet.measurement.bearing import update_bearing
+from dropanchor_service.estimation.fleet.measurement.heading import update_heading
+from dropanchor_service.estimation.fleet.measurement.range import predict_range, update_range
+from dropanchor_service.estimation.fleet.measurement.scalar import project
+from dropanchor_service.estimation.fleet.measurement.speed import truncate_speed
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.belief import STATE, hypothesis_of, jacobian_fd, node_of
 
@@ -152,7 +149,7 @@ def test_a_range_without_outliers_is_the_kalman_filter() -> None:
     predicted(s, H, dz=0.0)
     expected = kalman(s, P, H, 0.05, 0.04)
     one, scratch = hypothesis_of(s, P, H)
-    update_range(one, scratch, 0.05, 0.04, 0.0, 0.8, 0.8, Tuning())
+    update_range(one, scratch, 0.05, 0.04, Tuning(outlier_probability=0.0))
     np.testing.assert_allclose(one["mean"], expected[0], atol=1e-12)
     np.testing.assert_allclose(one["cov"], expected[1], atol=1e-12)
 
@@ -174,7 +171,7 @@ def test_a_range_mixes_hit_and_outlier_by_their_probabilities() -> None:
     spread = beta * np.outer(taken[0] - mean, taken[0] - mean) + (1 - beta) * np.outer(s - mean, s - mean)
     expected = beta * taken[1] + (1 - beta) * P + spread
     one, scratch = hypothesis_of(s, P, H)
-    update_range(one, scratch, e, variance, t.outlier_probability, t.outlier_mean, t.outlier_std, t)
+    update_range(one, scratch, e, variance, t)
     np.testing.assert_allclose(one["mean"], mean, atol=1e-12)
     np.testing.assert_allclose(one["cov"], expected, atol=1e-12)
     assert scratch["out"][0] == pytest.approx(math.log(hit + miss))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 
-from dropanchor_service.evaluation.pcrb import Path, Sensors, position_bound
+from dropanchor_evaluation.pcrb import Path, Sensors, position_bound
 
 N, DT = 400, 0.05
 T = DT * np.arange(N)

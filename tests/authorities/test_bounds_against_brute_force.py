@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
+from dropanchor_evaluation.bounds import vehicle
+from dropanchor_evaluation.bounds.linear import WAVE_DAMPING
+from dropanchor_evaluation.bounds.vehicle import Knowledge, Motion, raw_model, scalar_model
+from dropanchor_evaluation.pcrb import Path
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.evaluation.bounds import vehicle
-from dropanchor_service.evaluation.bounds.linear import WAVE_DAMPING
-from dropanchor_service.evaluation.bounds.vehicle import Knowledge, Motion, raw_model, scalar_model
-from dropanchor_service.evaluation.pcrb import Path
 from dropanchor_tag_client.simulator.imu import GRAVITY, Attitude, into_body, turned, untilted
 from dropanchor_tag_client.simulator.sensors import SensorModels, calibrated, preset
 

@@ -17,7 +17,7 @@ SEEDS = range(5900, 5906)
 STEP_HZ = (1.2, 2.6)
 
 
-@njit
+@njit(cache=True)
 def detect(g: Any, t: Any, size: Any, steps: Any, speed: Any) -> None:
     start_gait(g, size[0])
     for k in range(1, len(t)):
@@ -25,7 +25,7 @@ def detect(g: Any, t: Any, size: Any, steps: Any, speed: Any) -> None:
         speed[k] = step_speed(g)
 
 
-@njit
+@njit(cache=True)
 def count_regular(g: Any, t: Any, size: Any, regular: Any) -> None:
     start_gait(g, size[0])
     for k in range(1, min(len(t), len(regular))):

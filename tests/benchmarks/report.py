@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from benchmarks.step import Figures
-from dropanchor_service.evaluation.results import PAGES, ROOT, Measured, write
+from dropanchor_evaluation.results import PAGES, ROOT, Measured, write
 
 _PAGE = PAGES / "performance.md"
-_PAGE_OF = dict.fromkeys(("cluster", "hosts", "shard"), PAGES / "cluster.md")
+_PAGE_OF = {**dict.fromkeys(("cluster", "hosts", "shard"), PAGES / "cluster.md"), "walk": PAGES / "walk.md"}
 """Tables that have a page of their own."""
 _WHOLE = ("estimation/fleet", "ingest", "zenoh_io")
 _CLUSTER = ("cluster", "shards", "ownership")
@@ -28,6 +28,7 @@ SOURCES = {
     "shard": (*_WHOLE, "cluster", "shards", "ownership", "checkpoints"),
     "small": (*_WHOLE, "runtime", "events", "delivery"),
     "sites": ("estimation/fleet", "ingest", "store"),
+    "walk": ("dashboard",),
     "zones": ("zones",),
 }
 """What each table measures, below the package of the service."""

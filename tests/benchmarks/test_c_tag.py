@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import proc
-from dropanchor_service.evaluation.results import PAGES, ROOT, Measured, write
+from dropanchor_evaluation.results import PAGES, ROOT, Measured, write
 from support.listening import listening
 from support.relay import running_relay
 from support.zenoh_pico import zenoh_pico

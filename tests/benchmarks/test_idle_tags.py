@@ -36,7 +36,7 @@ def test_the_cost_of_a_hundred_thousand_tags_of_which_one_in_a_hundred_moves(
         moved = json.loads(fleet.request("end"))
         after = when_quiet(lambda: counters(service))
         registered_tags = int(service.metric("dropanchor_tags_registered"))
-        pending = int(service.metric("dropanchor_newcomers"))
+        pending = int(service.metric("dropanchor_tags_pending"))
     per_tag = (registered.resident_bytes - empty.resident_bytes) / (TAGS - MOVING)
     cpu = (after.cpu_s - registered.cpu_s) / MOVING_S
     report.record(

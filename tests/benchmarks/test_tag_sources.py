@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks import proc
 from benchmarks.tag_sources import Process, imu, mqtt, publish, serial
-from dropanchor_service.evaluation.results import PAGES, ROOT, Measured, write
+from dropanchor_evaluation.results import PAGES, ROOT, Measured, write
 from support.commands import python
 from support.listening import ReceivedFrames, listening
 from support.mosquitto import needs_mosquitto

@@ -16,6 +16,7 @@ from dropanchor_service.cluster import leases
 from dropanchor_service.cluster.database import connect
 from dropanchor_tag_client import TagClient
 from support.browser import open_page, running_chromium
+from support.patience import PATIENCE_S
 from support.postgresql import Postgresql, needs_postgresql, running_postgresql
 from support.repeated import repeated
 from support.service import Running, running_service
@@ -77,7 +78,7 @@ def driving_carts(cluster: Cluster, *sites: str) -> Iterator[None]:
     """Let the cart of each site drive round a circle until the block ends."""
     with ExitStack() as opened:
         clients = [
-            opened.enter_context(TagClient("cart", site=site, connect=cluster.router, connect_timeout_s=20))
+            opened.enter_context(TagClient("cart", site=site, connect=cluster.router, connect_timeout_s=PATIENCE_S))
             for site in sites
         ]
         begun_s = time.monotonic()
@@ -100,7 +101,7 @@ def is_current(answer: httpx.Response, epoch: int) -> bool:
 def asked_until(node: Running, site: str, epoch: int) -> list[httpx.Response]:
     """Ask for the pose of a cart until it is a current one of this epoch. Return all answers."""
     answers: list[httpx.Response] = []
-    with httpx.Client(base_url=node.url, trust_env=False, timeout=30.0) as client:
+    with httpx.Client(base_url=node.url, trust_env=False, verify=False) as client:
         while not answers or not is_current(answers[-1], epoch):
             answers.append(client.get(f"/api/v1/sites/{site}/tags/cart/pose"))
             time.sleep(0.02)

@@ -10,6 +10,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
+from support.patience import PATIENCE_S
 from support.service import Running, running_service
 
 EVIL = "https://evil.example"
@@ -47,7 +48,7 @@ def _refuses_a_foreign_feed(service: Running) -> None:
         connect(url, origin=Origin(EVIL), proxy=None) as page,
         pytest.raises(ConnectionClosed, match=r"http\.cors_origins"),
     ):
-        page.recv(timeout=10.0)
+        page.recv(PATIENCE_S)
 
 
 def test_a_service_for_the_network_has_its_addresses_its_name_and_those_of_the_settings(tmp_path: Path) -> None:

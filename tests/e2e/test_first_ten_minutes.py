@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dropanchor_tag_client import TagClient
+from support.patience import PATIENCE_S
 from support.recordings import write_square
 from support.service import ROOT, Running, environment, running_service
 from support.zenoh_router import free_port, wait_until
@@ -28,7 +29,7 @@ def snippet(text: str, endpoint: str) -> str:
 def shell(line: str, **options: Any) -> None:
     """Run a command line as in a new terminal, without the environment of the service."""
     bare = {"PATH": "/usr/bin:/bin", "PYTHONPATH": environment()["PYTHONPATH"]}
-    subprocess.run(["sh", "-c", line], check=True, timeout=120, env=bare, capture_output=True, **options)
+    subprocess.run(["sh", "-c", line], check=True, timeout=PATIENCE_S, env=bare, capture_output=True, **options)
 
 
 def tags(service: Running) -> dict[str, dict[str, Any]]:
@@ -39,7 +40,7 @@ def test_every_documented_way_to_start_a_tag_uses_the_same_anchor(tmp_path: Path
     with running_service() as service:
         for text in (README, TAG_README):
             subprocess.run(
-                [sys.executable, "-c", snippet(text, service.zenoh)], check=True, timeout=120, env=environment()
+                [sys.executable, "-c", snippet(text, service.zenoh)], check=True, timeout=PATIENCE_S, env=environment()
             )
         (line,) = re.findall(r"^(echo .*)\.venv/bin/dropanchor-tag publish (.*)$", README, re.MULTILINE)
         shell(f"{line[0]}{sys.executable} -m dropanchor_tag_client publish {line[1]} --connect {service.zenoh}")
@@ -57,7 +58,7 @@ def test_every_documented_way_to_start_a_tag_uses_the_same_anchor(tmp_path: Path
 def test_the_tag_of_the_readme_is_told_what_a_position_needs_and_is_never_lost() -> None:
     with running_service() as service:
         program = snippet(README, service.zenoh)
-        subprocess.run([sys.executable, "-c", program], check=True, timeout=120, env=environment())
+        subprocess.run([sys.executable, "-c", program], check=True, timeout=PATIENCE_S, env=environment())
         wait_until(lambda: "hint" in service.ask("GET", "/api/v1/tags/forklift-7/pose").json())
         pose = service.get("/api/v1/tags/forklift-7/pose")
         needs = "A position needs about 20 s of ranges and of motion samples: 1 and 1 have arrived."

@@ -17,6 +17,7 @@ import pytest
 from dropanchor_service.cli import main
 from support.foxglove_viewer import viewer_at
 from support.live_tags import LiveTags, is_current
+from support.patience import PATIENCE_S
 from support.service import Running, command, environment, running_service
 from support.zenoh_router import free_port, wait_until
 
@@ -37,7 +38,7 @@ def running_bridge(*arguments: str) -> Iterator[tuple[str, list[str]]]:
             yield _address(said), said
         finally:
             process.send_signal(signal.SIGTERM)
-            assert process.wait(30) == 0, said
+            assert process.wait(PATIENCE_S) == 0, said
             reader.join()
 
 

@@ -27,8 +27,9 @@ def assert_answered(said: str, service: Running) -> dict[str, Any]:
     answers: dict[str, Any] = json.loads(said.splitlines()[-1])
     (pose,) = service.get("/api/v1/poses")["poses"]
     assert (answers["site"], answers["online"], answers["states"]) == ("default", [pose["online"]], [pose["state"]])
-    ((lon, lat),) = answers["places"]
+    ((lon, lat, alt),) = answers["places"]
     assert (lon, lat) == pytest.approx((13.4, 52.5), abs=0.001)
+    assert alt == 34.0
     assert answers["time"] == service.get(f"/api/v1/tags/{TAG}/pose")["t_utc"]
     assert answers["track"] == len(service.get(f"/api/v1/tags/{TAG}/track")["poses"])
     assert answers["columns"][:3] == ["t_ns", "t_utc", "state"]

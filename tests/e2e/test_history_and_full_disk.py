@@ -10,6 +10,7 @@ from dropanchor_schemas import keys
 from dropanchor_schemas.track import Track
 from dropanchor_schemas.wire import ENCODING_PACKED, encode_packed
 from dropanchor_service.recording.reading import RecordingReader
+from support.patience import PATIENCE_S
 from support.service import Running, running_service, settings_file, straight_north
 from support.zenoh_router import connected_session, wait_until
 
@@ -40,7 +41,9 @@ def test_a_track_and_the_pose_at_a_time_survive_a_restart(tmp_path: Path) -> Non
         assert len(poses) >= 8
         middle = poses[3].t_ns
         assert service.get(f"/api/v1/tags/a/pose?at={middle}")["state"] == poses[3].state
-        replies = [reply.ok for reply in session.get(f"{keys.pose_key('default', 'a')}?at={middle}", timeout=5.0)]
+        replies = [
+            reply.ok for reply in session.get(f"{keys.pose_key('default', 'a')}?at={middle}", timeout=PATIENCE_S)
+        ]
         assert replies[0] is not None
         assert str(middle) in replies[0].payload.to_string()
 

@@ -5,6 +5,7 @@ import socket
 import subprocess
 from pathlib import Path
 
+from support.patience import PATIENCE_S
 from support.service import command, environment, running_service
 from support.zenoh_router import free_endpoint
 
@@ -12,7 +13,7 @@ from support.zenoh_router import free_endpoint
 def second(folder: Path) -> subprocess.CompletedProcess[str]:
     arguments = ("serve", "--port", "0", "--zenoh-listen", free_endpoint(), "--data-dir", str(folder))
     return subprocess.run(
-        command(*arguments), capture_output=True, text=True, env=environment(), timeout=60, check=False
+        command(*arguments), capture_output=True, text=True, env=environment(), timeout=PATIENCE_S, check=False
     )
 
 

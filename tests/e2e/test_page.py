@@ -11,6 +11,7 @@ from playwright.sync_api import Browser
 
 from dropanchor_tag_client import TagClient
 from support.browser import WatchedPage, running_chromium, watched_page
+from support.patience import PATIENCE_S
 from support.repeated import repeated
 from support.service import running_service
 from support.zenoh_router import free_endpoint, free_port
@@ -45,7 +46,7 @@ def driving_tag(name: str, endpoint: str) -> Iterator[None]:
         client.publish_heading(math.remainder(turned + math.pi / 2, math.tau), std_rad=0.03)
         client.publish_range("7", math.hypot(x, y), std_m=0.1)
 
-    with TagClient(name, connect=endpoint, connect_timeout_s=20) as client, repeated(publish, 0.1):
+    with TagClient(name, connect=endpoint, connect_timeout_s=PATIENCE_S) as client, repeated(publish, 0.1):
         yield
 
 
@@ -93,8 +94,8 @@ def test_the_page_marks_every_pose_as_out_of_date_until_the_service_is_back(chro
         assert page.page.locator("tr[data-tag='cart'] td.c-state").inner_text() == "Out of date"
         assert page.tags()["cart"]["state"] == "outdated"
         with running_service("--config", str(config), "--port", str(port), endpoint=endpoint):
-            page.wait_for("dropanchor.status() === 'live'", timeout_s=60)
+            page.wait_for("dropanchor.status() === 'live'")
             page.page.locator("#lost").wait_for(state="hidden")
             frames = page.page.evaluate("dropanchor.streaming().frames")
-            page.wait_for(f"dropanchor.streaming().frames > {frames} + 5", timeout_s=60)
+            page.wait_for(f"dropanchor.streaming().frames > {frames} + 5")
             page.wait_for("dropanchor.tags().some(({ tag, state }) => tag === 'cart' && state !== 'outdated')")

@@ -10,6 +10,7 @@ from dropanchor_schemas.answers import SamplesAcknowledged
 from dropanchor_schemas.wire import ENCODING_JSON, Frame, encode_json
 from dropanchor_service.cli import main
 from support import phyphox
+from support.patience import PATIENCE_S
 from support.sensor_logger import G, message, recording
 from support.service import Running, running_service, settings_file, straight_north
 from support.zenoh_router import free_port, wait_until
@@ -146,7 +147,7 @@ def test_an_open_web_socket_makes_its_tag_online(tmp_path: Path) -> None:
     with running_service("--config", str(config)) as service:
         url = f"{service.url.replace('http', 'ws')}/api/v1/ingest/stream?tag=anna"
         with connect(url, proxy=None) as socket:
-            socket.recv(5)
+            socket.recv(PATIENCE_S)
             assert service.get("/api/v1/tags/anna")["online"]
         wait_until(lambda: not service.get("/api/v1/tags/anna")["online"])
 
@@ -157,10 +158,10 @@ def test_a_message_that_is_sent_again_over_a_web_socket_counts_as_a_duplicate_an
         url = f"{service.url.replace('http', 'ws')}/api/v1/ingest/stream?tag=anna"
         for sent in (messages[:2], messages[1:]):
             with connect(url, proxy=None) as socket:
-                assert SamplesAcknowledged.model_validate_json(socket.recv(5)).message == 0
+                assert SamplesAcknowledged.model_validate_json(socket.recv(PATIENCE_S)).message == 0
                 for message in sent:
                     socket.send(message.decode())
-                    assert SamplesAcknowledged.model_validate_json(socket.recv(5)).samples == 10
+                    assert SamplesAcknowledged.model_validate_json(socket.recv(PATIENCE_S)).samples == 10
         wait_until(lambda: samples(service, {}) == {"range": 30})
         wait_until(lambda: service.get("/api/v1/tags/anna")["rejected"] == {"duplicate": 1})
 

@@ -14,17 +14,18 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 import pytest
 
+from dropanchor_evaluation.reference import fields_page
 from dropanchor_schemas.wire import ENCODING_JSON, Frame, encode_json
 from dropanchor_service.api.formats.track import NESTED, RELATIVES
-from dropanchor_service.reference import fields_page
 from support.guides import blocks_of, follow
 from support.service import Running, straight_north
 from support.yard import running_yard
 from support.zenoh_router import wait_until
 
 GUIDE, TAG = "read-exports.md", "forklift-7"
-EMPTY = RELATIVES  # of a tag that knows north
-TYPES = {"anchor": "VARCHAR"} | dict.fromkeys(EMPTY, "DOUBLE")  # what a reader of CSV has to be told
+EMPTY = [*RELATIVES, "floor_probability"]  # of a tag that knows north, on a site without floors
+# What a reader of CSV has to be told.
+TYPES = dict.fromkeys(("anchor", "floor"), "VARCHAR") | dict.fromkeys(EMPTY, "DOUBLE")
 KINDS = {"i": "integer", "f": "number", "O": "text", "M": "timestamp", "U": "text"}
 DUCKDB = {"BIGINT": "integer", "FLOAT": "number", "DOUBLE": "number", "VARCHAR": "text"}
 
@@ -82,11 +83,11 @@ def test_pandas_pyarrow_and_duckdb_see_the_types_of_the_table_in_parquet(exports
 def test_pandas_pyarrow_and_duckdb_see_the_types_of_the_table_in_csv(exports: Path) -> None:
     file = exports / "track.csv"
     expected = fields_page.of_poses()["track, CSV"] | {"t_utc": "timestamp"}  # readers know ISO 8601
-    told = {"anchor": pyarrow.string()} | dict.fromkeys(EMPTY, pyarrow.float64())
+    told = dict.fromkeys(("anchor", "floor"), pyarrow.string()) | dict.fromkeys(EMPTY, pyarrow.float64())
     options = pyarrow.csv.ConvertOptions(column_types=told)
     in_arrow = pyarrow.csv.read_csv(file, convert_options=options)
     assert {field.name: fields_page.of_arrow(field.type) for field in in_arrow.schema} == expected
-    assert kinds_of(pd.read_csv(file, dtype={"anchor": "string"}, parse_dates=["t_utc"])) == expected
+    assert kinds_of(pd.read_csv(file, dtype={"anchor": "string", "floor": "string"}, parse_dates=["t_utc"])) == expected
     assert in_duckdb(f"SELECT * FROM read_csv('{file}', types = {TYPES})") == expected
 
 

@@ -14,11 +14,19 @@ from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, encode_json,
 from dropanchor_service.cli import main
 from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.recording.mcap_file import McapFile
+from dropanchor_service.recording.reading import RecordingReader
 from dropanchor_service.settings.sources import load_settings
+from support.patience import PATIENCE_S
 from support.service import running_service, settings_file, straight_north
 from support.zenoh_router import connected_session, wait_until
 
 S = 1_000_000_000
+
+
+def on_disk(folder: Path) -> tuple[int, int]:
+    """Return how many messages and poses are in the recording so far, of which a kill leaves whole chunks."""
+    turns = [turn for file in folder.glob("*.mcap") for turn in RecordingReader(file).turns()]
+    return sum(len(turn.messages) for turn in turns), sum(len(turn.estimates) for turn in turns)
 
 
 @pytest.mark.parametrize("engine", ["paper", "fleet"])
@@ -38,13 +46,13 @@ def test_a_replayed_recording_gives_the_live_poses_even_after_a_kill(
             put = partial(session.put, congestion_control=zenoh.CongestionControl.BLOCK)
             put(keys.samples_key("default", "a"), encode_packed(frame), encoding=ENCODING_PACKED)
             put(keys.samples_key("default", "b"), encode_json(frame), encoding=ENCODING_JSON)
-        wait_until(lambda: service.metric("dropanchor_poses_total") >= 380, 120.0)
+        wait_until(lambda: service.metric("dropanchor_poses_total") >= 380)
         live = service.get("/api/v1/poses")["poses"]
         httpx.put(f"{service.url}/api/v1/tags/a/settings", json={}).raise_for_status()
         wait_until(lambda: service.metric("dropanchor_recording_messages_total") >= 400)
-        time.sleep(1.5)  # until the last chunk is on the disk
+        wait_until(lambda: on_disk(tmp_path / "recordings") >= (20, 380))
         service.process.kill()
-        service.process.wait(60.0)
+        service.process.wait(PATIENCE_S)
     assert main(["replay", str(tmp_path / "recordings"), "--out", str(tmp_path / "poses.csv")]) == 0
     output = capsys.readouterr()
     assert "is truncated" in output.err
@@ -73,7 +81,7 @@ def test_a_recording_that_starts_midway_is_compared_where_both_runs_have_a_posit
         def send(step: int) -> None:
             frame = straight_north(20, end_ns + step * 2 * S, speed_mps=0.5)
             session.put(keys.samples_key("default", "a"), encode_packed(frame), encoding=ENCODING_PACKED)
-            wait_until(lambda: service.metric("dropanchor_poses_total") >= 18 * (step + 1), 120.0)
+            wait_until(lambda: service.metric("dropanchor_poses_total") >= 18 * (step + 1))
 
         for step in range(5):
             send(step)

@@ -12,10 +12,11 @@ import zenoh
 from dropanchor_schemas import keys
 from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.evaluation.replay import Samples, Track, anchors_of, replay, samples_of, track_of
+from dropanchor_service.offline.replay import Samples, Track, anchors_of, replay, samples_of, track_of
 from dropanchor_service.settings.engine_columns import tag_columns
 from dropanchor_service.settings.sources import load_settings
 from dropanchor_tag_client.recording import read_recording
+from support.patience import PATIENCE_S
 from support.recordings import recording_or_skip, write_square
 from support.service import environment, running_service
 from support.zenoh_router import connected_session, wait_until
@@ -68,7 +69,7 @@ def live(recording: Path, anchor: str, config: Path, last_ns: int) -> dict[int, 
         arguments = ["replay", str(recording), "--tag", "cart", "--anchor", anchor, "--speed", "50"]
         arguments += ["--t0-ns", str(T0_NS), "--connect", service.zenoh]
         tag = [sys.executable, "-m", "dropanchor_tag_client", *arguments]
-        subprocess.run(tag, check=True, env=environment(), timeout=120, capture_output=True)
+        subprocess.run(tag, check=True, env=environment(), timeout=PATIENCE_S, capture_output=True)
         wait_until(lambda: last_ns in seen)
     return seen
 

@@ -14,6 +14,7 @@ from threading import Thread
 import pytest
 
 from dropanchor_service.cli import main
+from support.patience import PATIENCE_S
 from support.repeated import repeated
 from support.ros2 import IMU, ODOMETRY, POSE, RANGE, TF, CdrReader, Robot, imu_cdr, range_cdr, read_pose
 from support.service import Running, command, environment, running_service, settings_file
@@ -54,7 +55,7 @@ def running_bridge(service: Running, ros_router: str, *arguments: str) -> Iterat
             yield said
         finally:
             process.send_signal(signal.SIGTERM)
-            assert process.wait(30) == 0, said
+            assert process.wait(PATIENCE_S) == 0, said
             reader.join()
 
 
@@ -89,7 +90,7 @@ def test_a_robot_is_a_tag_and_gets_its_pose_with_covariance_odometry_and_tf(serv
             robot.subscribe("tf", TF),
         ]
         with driving(robot):
-            wait_until(lambda: all(len(robot.received[key]) >= 10 for key in keys), 90.0)
+            wait_until(lambda: all(len(robot.received[key]) >= 10 for key in keys))
         pose, odometry, tf = (robot.received[key] for key in keys)
 
         reader = CdrReader(pose[-1][0])

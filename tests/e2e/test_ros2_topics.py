@@ -12,6 +12,7 @@ import zenoh
 
 from support.commands import environment
 from support.listening import listening
+from support.patience import PATIENCE_S
 from support.ros2 import IMU, RANGE, CdrWriter, Robot, imu_cdr
 from support.service import command
 from support.zenoh_router import connected_session, free_endpoint, free_port, running_router, wait_until
@@ -44,7 +45,7 @@ def bridge(router: str, *arguments: str) -> Iterator[list[str]]:
             yield said
         finally:
             process.send_signal(signal.SIGTERM)
-            assert process.wait(30) == 0, said
+            assert process.wait(PATIENCE_S) == 0, said
             reader.join()
 
 

@@ -17,6 +17,7 @@ from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.settings.sources import load_settings
 from dropanchor_tag_client import TagClient
 from support.ingest import IngestBench
+from support.patience import PATIENCE_S
 from support.service import Running, running_service, settings_file, straight_north
 from support.zenoh_router import connected_session, wait_until
 
@@ -55,7 +56,7 @@ def send(client: TagClient, frame: Frame) -> None:
 def ask(session: zenoh.Session, key: str) -> dict[str, dict[str, object]]:
     """Send a query. Return the replies by key; an error has the key `error`."""
     replies = {}
-    for reply in session.get(key, timeout=5.0):
+    for reply in session.get(key, timeout=PATIENCE_S):
         if reply.ok is not None:
             replies[str(reply.ok.key_expr)] = json.loads(reply.ok.payload.to_string())
         elif reply.err is not None:

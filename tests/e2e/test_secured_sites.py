@@ -7,6 +7,7 @@ import pytest
 
 from dropanchor_service.cli import main
 from dropanchor_tag_client import TagClient, read_credentials
+from support.patience import PATIENCE_S
 from support.service import running_router, running_service, straight_north
 from support.zenoh_router import free_port, wait_until
 
@@ -48,7 +49,7 @@ def test_two_sites_share_a_secured_service_and_a_router(tmp_path: Path, capsys: 
         for bundle in bundles:
             credentials = read_credentials(bundle)
             with TagClient(
-                credentials.tag, site=credentials.site, connect=credentials.session, connect_timeout_s=20
+                credentials.tag, site=credentials.site, connect=credentials.session, connect_timeout_s=PATIENCE_S
             ) as client:
                 for sample in straight_north(5).ranges:
                     client.publish_range("7", sample.range_m, t_ns=sample.t_ns)

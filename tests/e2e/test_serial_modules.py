@@ -11,6 +11,7 @@ from dropanchor_tag_client import TagClient
 from dropanchor_tag_client.sources.modules.catalogue import MODULES
 from support.commands import start_python
 from support.module_strings import EXAMPLES
+from support.patience import PATIENCE_S
 from support.repeated import repeated
 from support.serial_module import Answer, plugged_in
 from support.service import running_service, settings_file
@@ -60,7 +61,7 @@ def test_each_module_is_a_dot_that_moves_along_its_ranges(tmp_path: Path) -> Non
             module = stack.enter_context(plugged_in(tmp_path / name, answer, baud, period_s=0.1))
             arguments = ("--tag", name, "--module", name, "--connect", service.zenoh, *example.options)
             process = start_python("-m", "dropanchor_tag_client", "serial", str(module.path), *arguments)
-            stack.callback(process.communicate, timeout=30)
+            stack.callback(process.communicate, timeout=PATIENCE_S)
             stack.callback(process.terminate)
         stack.enter_context(imu_of_others(service.zenoh))
 

@@ -13,6 +13,7 @@ import zenoh
 from dropanchor_schemas import keys
 from dropanchor_schemas.wire import Frame
 from dropanchor_tag_client import TagClient
+from support.patience import PATIENCE_S
 from support.service import Running, running_service, straight_north
 from support.zenoh_router import connected_session, wait_until
 
@@ -69,7 +70,7 @@ def place(pose: dict[str, Any]) -> tuple[float, float]:
 
 
 def ask(session: zenoh.Session, key: str) -> dict[str, Any]:
-    replies = [reply.ok for reply in session.get(key, timeout=5.0)]
+    replies = [reply.ok for reply in session.get(key, timeout=PATIENCE_S)]
     return {str(reply.key_expr): json.loads(reply.payload.to_string()) for reply in replies if reply is not None}
 
 
@@ -170,7 +171,11 @@ def _check_events(service: Running, session: zenoh.Session, endpoint: str) -> No
         session.declare_subscriber(f"{keys.PREFIX}/*/tag/*/event", take),
         TagClient("lift", site="south", connect=endpoint) as lift,
     ):
-        publish(lift, straight_north(20), ALL)
+        drive = straight_north(80)  # long enough for ranges to confirm the start
+        for heading, distance in zip(drive.headings, drive.ranges, strict=True):
+            lift.publish_heading(heading.heading_rad, t_ns=heading.t_ns, std_rad=heading.std_rad)
+            lift.publish_range("7", distance.range_m, t_ns=distance.t_ns, std_m=distance.std_m)
+        lift.flush()
         wait_until(lambda: received == [(keys.event_key("south", "lift"), "urn:dropanchor:site:south")])
     (event,) = service.get(f"{base}/events")["events"]
     assert (event["type"], event["subject"]) == ("dropanchor.zone.enter", "lift")

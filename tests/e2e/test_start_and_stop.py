@@ -9,6 +9,7 @@ from pathlib import Path
 import httpx
 import pytest
 
+from support.patience import PATIENCE_S
 from support.service import command, environment, running_service
 from support.zenoh_router import (
     free_endpoint,
@@ -21,13 +22,18 @@ from support.zenoh_router import (
 
 def run(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        command(*arguments), capture_output=True, text=True, env=environment(**variables), timeout=120.0, check=False
+        command(*arguments),
+        capture_output=True,
+        text=True,
+        env=environment(**variables),
+        timeout=PATIENCE_S,
+        check=False,
     )
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_service_at_once_even_with_a_stream_open(how: signal.Signals) -> None:
-    with running_service() as service, httpx.stream("GET", f"{service.url}/api/v1/stream", timeout=60.0) as stream:
+    with running_service() as service, httpx.stream("GET", f"{service.url}/api/v1/stream") as stream:
         assert stream.status_code == 200
         started = time.monotonic()
         assert service.stop(how) == 0
@@ -106,7 +112,7 @@ def test_the_router_command_routes_between_a_service_and_its_tags_and_stops_on_a
             with running_service("--zenoh-connect", endpoint) as service:
                 assert service.stop() == 0
             router.send_signal(signal.SIGTERM)
-            assert router.wait(60.0) == 0
+            assert router.wait(PATIENCE_S) == 0
         finally:
             router.kill()
 

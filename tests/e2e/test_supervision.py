@@ -13,6 +13,7 @@ import pytest
 from dropanchor_service.commands import serve
 from dropanchor_service.runtime.memory import HeapTrimmer
 from dropanchor_service.runtime.systemd import Systemd
+from support.patience import PATIENCE_S
 from support.service import environment
 from support.zenoh_router import free_endpoint
 
@@ -67,7 +68,7 @@ def test_systemd_is_notified_of_the_start_of_progress_and_of_the_stop(tmp_path: 
             while notification == b"WATCHDOG=1":
                 notification = manager.recv(100)
             assert notification == b"STOPPING=1"
-            process.communicate(timeout=30.0)
+            process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 0
 
 

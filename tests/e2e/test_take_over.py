@@ -21,6 +21,7 @@ from dropanchor_schemas.epochs import EpochFence
 from dropanchor_service.api.routes import event_examples
 from dropanchor_service.commands.serve import EXIT_GONE
 from support.live_tags import LiveTags, distance, fused, is_current, poses_of, samples_of
+from support.patience import PATIENCE_S
 from support.postgresql import Postgresql, needs_postgresql, running_postgresql
 from support.relay import running_relay
 from support.service import Running, command, environment, running_service
@@ -91,7 +92,7 @@ class Cluster:
 
     def run(self, *arguments: str) -> "subprocess.CompletedProcess[str]":
         words = command("cluster", *arguments, "--url", self.database.url())
-        return subprocess.run(words, capture_output=True, text=True, env=environment(), check=False, timeout=60)
+        return subprocess.run(words, capture_output=True, text=True, env=environment(), check=False, timeout=PATIENCE_S)
 
 
 def readiness(service: Running) -> str:
@@ -103,7 +104,7 @@ def wait_for(service: Running, *words: str) -> None:
 
 
 def wait_until_gone(service: Running) -> None:
-    assert service.process.wait(60.0) == EXIT_GONE, "".join(service.log)
+    assert service.process.wait(PATIENCE_S) == EXIT_GONE, "".join(service.log)
     wait_until(lambda: any("Started again, this process is a standby" in line for line in service.log))
 
 

@@ -10,6 +10,7 @@ import pytest
 from dropanchor_schemas import keys
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, RangeSample, encode_json, encode_packed
 from support.commands import python, start_python
+from support.patience import PATIENCE_S
 from support.service import Running, running_service, settings_file
 from support.zenoh_router import connected_session, wait_until
 
@@ -82,7 +83,7 @@ def test_motion_from_the_future_is_aligned_with_the_ranges_of_its_tag(service: R
             process.stdin.flush()
             time.sleep(0.02)
     finally:
-        process.communicate(timeout=30)
+        process.communicate(timeout=PATIENCE_S)
     wait_until(lambda: service.get("/api/v1/tags/cart")["samples"] == {"imu": 200, "range": 40})
     status = service.get("/api/v1/tags/cart")
     assert status["clock_offset"]["corrected"]

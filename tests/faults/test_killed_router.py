@@ -25,11 +25,11 @@ def test_a_killed_router_costs_no_sample_and_the_poses_become_current_again(tmp_
                 back_s = time.monotonic()
                 if life == 0:
                     tags.start()
-                wait_until(lambda: is_current(service, TAGS), 60.0)
+                wait_until(lambda: is_current(service, TAGS))
                 _log.info("All poses were current %.2f s after the router started.", time.monotonic() - back_s)
                 if life == KILLS:
                     tags.finish()
-                    wait_until(lambda: samples_of(service) == tags.samples, 120.0)
+                    wait_until(lambda: samples_of(service) == tags.samples)
                     expected = tags.expected(config)
                     answers = fused(expected, partial(poses_of, service))
                     assert service.metric("dropanchor_missed_messages_total") == 0

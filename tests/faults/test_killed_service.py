@@ -92,5 +92,5 @@ def lost(service: Running) -> dict[str, float]:
 
 def wait_until_current(service: Running) -> float:
     """Wait until the poses are current. Return the time since the start of the process in s."""
-    wait_until(lambda: is_current(service, TAGS), 60.0)
+    wait_until(lambda: is_current(service, TAGS))
     return time.monotonic() - service.began_s

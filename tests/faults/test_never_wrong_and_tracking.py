@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dropanchor_evaluation.product.scores import rotated_onto
+from dropanchor_evaluation.simulated import PriorKnowledge, run_engine
 from dropanchor_service.estimation.columns import Array, Frame, State
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.evaluation.accuracy import nees
-from dropanchor_service.evaluation.product.scores import rotated_onto
-from dropanchor_service.evaluation.simulated import PriorKnowledge, run_engine
+from dropanchor_service.offline.accuracy import nees
 from dropanchor_tag_client.simulator.perturbations import perturbed
 from dropanchor_tag_client.simulator.sensors import SensorModels
 from dropanchor_tag_client.simulator.simulation import Simulation, simulate

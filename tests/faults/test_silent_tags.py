@@ -131,7 +131,7 @@ def test_tags_that_vanish_all_at_once_delay_no_other_tag(kind: str, security: st
         activity = TagActivity(session)
         opened.enter_context(publishing(target, GONE, link))
         opened.enter_context(publishing(target, HERE))
-        wait_until(lambda: activity.alive >= {*GONE, *HERE} <= activity.longest_s.keys(), 120.0)
+        wait_until(lambda: activity.alive >= {*GONE, *HERE} <= activity.longest_s.keys())
         activity.reset()
         link.loss = 1.0
         wait_until(lambda: not activity.alive & set(GONE), 240.0)

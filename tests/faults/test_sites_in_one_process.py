@@ -120,7 +120,7 @@ def garbage() -> list[Message]:
 
 def test_a_site_with_garbage_strangers_and_moved_anchors_changes_no_bit_of_another() -> None:
     alone = Run(north()).feed(of_site("north", 1))
-    quota = Quota(max_tags=TAGS + 20, unproven_tags=5)
+    quota = Quota(max_tags=TAGS + 20, max_unconfirmed_tags=5)
     run = Run(north(), (south()[0], quota))
     run.feed(
         [*of_site("north", 1), *of_site("south", 2), *garbage()],

@@ -31,7 +31,7 @@ def test_a_signal_ends_a_busy_service_with_stuck_clients_without_loss(tmp_path: 
     options = ("--config", str(config), "--data-dir", str(tmp_path / "data"), "--zenoh-connect", endpoint)
     with router_process(endpoint):
         with tags, running_service(*options) as service, ExitStack() as opened:
-            wait_until(lambda: is_current(service, TAGS), 60.0)
+            wait_until(lambda: is_current(service, TAGS))
             address = service.url.removeprefix("http://")
             for sent in (NEVER_READS, b"GET /api/v1/poses HTTP/1.1\r\nHost:", b""):
                 open_stuck_clients(opened, address, sent)

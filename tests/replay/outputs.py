@@ -44,7 +44,7 @@ def smoothed(name: str, scenario: Scenario, lag: float | None = None) -> Table:
     for batch in read_batches(name):
         engine.process(batch)
     every = round(BATCH_S * scenario.models.ranges.hz) if scenario.models.ranges.hz else 1
-    return [[*_of_pose(pose), *[math.nan] * 5] for pose in smoothed_poses(engine, 0, lag)[::every]]
+    return [[*_of_pose(pose), *[math.nan] * 5] for pose in smoothed_poses(engine, 0, lag).poses[::every]]
 
 
 def smoothed_with_lag(name: str, scenario: Scenario) -> Table:
@@ -66,6 +66,11 @@ REPLAYS = [(name, engine) for name in SCENARIOS for engine in ("fleet", "paper")
 def replay(name: str, engine: str) -> Table:
     """Return COLUMNS of every pose that is kept."""
     return ENGINES[engine](name, SCENARIOS[name])
+
+
+def replay_with(engine: Engine, name: str) -> Table:
+    """Return COLUMNS of every pose that is kept of a fresh engine."""
+    return _online(engine, name, SCENARIOS[name])
 
 
 def expected_path(name: str, engine: str) -> Path:

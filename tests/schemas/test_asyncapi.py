@@ -12,6 +12,7 @@ from jsonschema import Draft7Validator, Draft202012Validator
 
 from dropanchor_schemas import asyncapi, keys
 from dropanchor_schemas.samples import SamplesMessage
+from support.patience import PATIENCE_S
 
 SPECS = "@asyncapi/specs@6.10.0"
 
@@ -23,7 +24,7 @@ def specification(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     if shutil.which("npm") is None:
         pytest.skip("npm is not installed: AsyncAPI's own schema cannot be fetched")
     fetched = subprocess.run(
-        ["npm", "pack", "--silent", SPECS], cwd=folder, capture_output=True, text=True, timeout=120
+        ["npm", "pack", "--silent", SPECS], cwd=folder, capture_output=True, text=True, timeout=PATIENCE_S
     )
     if fetched.returncode:
         pytest.skip(f"npm cannot fetch {SPECS}: {fetched.stderr.strip()[-200:]}")

@@ -15,6 +15,7 @@ from dropanchor_schemas.wire import (
     Frame,
     HeadingSample,
     ImuSample,
+    PressureSample,
     RangeSample,
     anchor_number,
     decode_packed,
@@ -28,6 +29,7 @@ EXAMPLE = Frame(
     ranges=[RangeSample(T + 10_000_000, 1, 12.25, 0.125), RangeSample(T + 12_500_000, anchor_number("L0"), 3.5)],
     headings=[HeadingSample(T + 20_000_000, 1.5, 0.0625)],
     bearings=[BearingSample(T + 30_000_000, 1, -0.5)],
+    pressures=[PressureSample(T + 40_000_000, 101_324.0, 21.5)],
     sequence=41,
     boot_id=0xDEADBEEF,
 )

@@ -15,16 +15,19 @@ from dropanchor_schemas.plans import Plan
 from dropanchor_schemas.shares import ShareRequest
 from dropanchor_schemas.site import TagSettings
 from dropanchor_schemas.zones import BatteryLowRule
-from dropanchor_service.api.omlox.models import Fence, LocationProvider, Trackable
 from dropanchor_service.api.routes.plan_examples import PLAN
 from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.format import Snapshot, UnreadableLayoutError, decoded
+from dropanchor_service.delivery.receiver_networks import AllowedNetwork
 from dropanchor_service.estimation.columns import POSE
 from dropanchor_service.events.drafts import destination_test
 from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.metrics.registry import Metrics
-from dropanchor_service.persistence import open_sites
+from dropanchor_service.persistence.site import open_sites
+from dropanchor_service.persistence.site_files import own_data_folder, put_site_files_in_place
+from dropanchor_service.persistence.site_folders import SiteFolders
+from dropanchor_service.persistence.zone_events import ZoneEvents
 from dropanchor_service.plans.reading.messages import Description, ReadPlan
 from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.security.credentials import authenticator_of, credentials_of
@@ -32,10 +35,8 @@ from dropanchor_service.security.identity import UnauthenticatedError
 from dropanchor_service.security.share_links import ShareLinks, share_links_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError, load_settings
-from dropanchor_service.site_files import own_data_folder, put_site_files_in_place
-from dropanchor_service.site_folders import SiteFolders
 from dropanchor_service.store import LatestPoses
-from dropanchor_service.zone_events import ZoneEvents
+from dropanchor_service.store.omlox_models import Fence, LocationProvider, Trackable
 from support.events import circle
 from support.plan_files import image_file
 
@@ -43,7 +44,7 @@ T_NS = 1_800_000_000_000_000_000
 NOBODY = 65534
 CHECKPOINT = "checkpoints/checkpoint-000000000002"
 WITH_COPY = [
-    *("site.json", "zones.json", "event_rules.json", "destinations.json", "plans.json"),
+    *("site.json", "zones.json", "event_rules.json", "destinations.json", "receiver_networks.json", "plans.json"),
     *("omlox_trackables.json", "omlox_tag_trackables.json", "omlox_providers.json", "omlox_fences.json"),
 ]
 BEGIN_EMPTY = ["history.sqlite", "events.sqlite", "share_links.json", "share_key"]
@@ -103,6 +104,8 @@ class Parts:
         self.events.items.rules.put("battery", BatteryLowRule(id="battery", type="battery_low"))
         hook = WebhookDestination(id="mes", type="webhook", url="https://mes.example/", secret=f"whsec_{'A' * 40}")
         self.events.destinations.put("mes", hook)
+        network = AllowedNetwork(network="192.168.1.0/24")
+        self.events.channels.networks.items.put(network.network, network)
         self.events.store.commit([destination_test("mes")], {})
         image = self.plans.add_image(ReadPlan(Description(), image_file()))
         self.plans.put("ground-floor", Plan.model_validate(PLAN | {"image": image.model_dump()}))
@@ -125,6 +128,7 @@ class Parts:
             "zones.json": "dock" in self.events.items.zones.all,
             "event_rules.json": "battery" in self.events.items.rules.all,
             "destinations.json": "mes" in self.events.destinations.all,
+            "receiver_networks.json": "192.168.1.0/24" in self.events.channels.networks.items.all,
             "plans.json": plan is not None,
             "plans/image": plan is None or self.plans.content(plan.image) is not None,
             "omlox_trackables.json": "t" in self.omlox.trackables.all,

@@ -9,6 +9,7 @@ from support.recordings import write_square
 
 COMPILING_S = 600.0  # at most, where no kernel is in the cache
 EXTRA = ("matplotlib", "scipy", "sympy")
+MAPS = ("pmtiles", "pypdfium2", "pyproj")
 SERVICE_AND_ENGINE = """
 import dropanchor_service.service
 from dropanchor_service.engines.choose import create_engine
@@ -37,13 +38,15 @@ sys.meta_path.insert(0, Absent())
 
 
 def test_the_service_with_the_engine_fleet_starts_without_them() -> None:
-    ended = python("-c", without(*EXTRA, "filterpy", "psycopg") + SERVICE_AND_ENGINE, timeout_s=COMPILING_S)
+    absent = (*EXTRA, *MAPS, "dropanchor_evaluation", "filterpy", "psycopg")
+    ended = python("-c", without(*absent) + SERVICE_AND_ENGINE, timeout_s=COMPILING_S)
     assert ended.returncode == 0, ended.stderr
 
 
 def test_the_service_with_the_engine_fleet_leaves_them_alone_where_they_are_installed() -> None:
     """numba imports the package scipy itself, to compare versions, but nothing in it."""
-    loaded = "import sys; print(*{'filterpy', 'matplotlib', 'psycopg', 'scipy.linalg', 'sympy'} & set(sys.modules))"
+    unused = {"filterpy", "matplotlib", "psycopg", "scipy.linalg", "sympy", *MAPS}
+    loaded = f"import sys; print(*{unused} & set(sys.modules))"
     ended = python("-c", SERVICE_AND_ENGINE + loaded, timeout_s=COMPILING_S)
     assert (ended.returncode, ended.stdout.split()) == (0, [])
 
@@ -51,7 +54,7 @@ def test_the_service_with_the_engine_fleet_leaves_them_alone_where_they_are_inst
 @pytest.mark.parametrize(
     ("missing", "extra", "command"),
     [
-        ("matplotlib", "evaluation", ["evaluate", "paper"]),
+        ("dropanchor_evaluation", "evaluation", ["evaluate", "paper"]),
         ("scipy", "evaluation", ["evaluate", "recordings"]),
         ("sympy", "evaluation", ["evaluate", "paper"]),
         ("matplotlib", "evaluation", ["replay", "a folder", "--plot=track.png"]),
@@ -74,7 +77,7 @@ def test_a_command_that_needs_an_extra_says_how_to_install_it(missing: str, extr
 
 def test_a_replay_without_a_picture_needs_no_extra(tmp_path: Path) -> None:
     replay = ("replay", str(write_square(tmp_path)), "--anchor=A")
-    ended = python("-c", without(*EXTRA, "filterpy") + COMMAND, *replay, timeout_s=COMPILING_S)
+    ended = python("-c", without(*EXTRA, "dropanchor_evaluation", "filterpy") + COMMAND, *replay, timeout_s=COMPILING_S)
     assert ended.returncode == 0
     assert "RMSE" in ended.stdout
 
@@ -140,3 +143,40 @@ def test_checkpoints_outside_the_database_need_an_extra_and_the_node_says_so(tmp
         command = ("cluster", "start", "--join", f"--config={config}", f"--folder={tmp_path}")
         ended = python("-c", without(missing) + COMMAND, *command)
         assert (ended.returncode, ended.stderr) == (2, f"dropanchor cluster: {sentence}\n")
+
+
+def test_floor_plans_without_the_extra_maps_are_pictures_and_the_rest_says_how_to_install_it() -> None:
+    check = """
+from io import BytesIO
+from PIL import Image
+from dropanchor_schemas.site import Georeference
+from dropanchor_service.plans.reading.messages import Request
+from dropanchor_service.plans.reading.read_plan import read_plan
+from dropanchor_service.plans.reading.refused import RefusedError
+file = BytesIO()
+Image.new("RGB", (40, 20)).save(file, "PNG")
+world, origin = [0.05, 0, 0, -0.05, 389500.025, 5819999.975], Georeference(lat=52.5, lon=13.4)
+for crs in ("", "site", "EPSG:25833"):
+    request = Request(media_type="image/png", world=world if crs else None, crs=crs, georeference=origin)
+    found = read_plan(file.getvalue(), request).description
+    print(found.width_px, found.note)
+try:
+    read_plan(b"%PDF-1.7", Request(media_type="application/pdf"))
+except RefusedError as error:
+    print(error)
+"""
+    ended = python("-c", without(*MAPS) + check)
+    assert ended.stdout.splitlines() == [
+        "40 ",
+        "40 The image does not lie within 100 km of the site's origin. Is its coordinate system right?",
+        "40 EPSG:25833 needs the extra `maps`: pip install 'dropanchor-service[maps]'",
+        "A PDF needs the extra `maps`: pip install 'dropanchor-service[maps]'.",
+    ], ended.stderr
+
+
+def test_a_base_map_without_the_extra_maps_stops_the_start_and_says_how_to_install_it(tmp_path: Path) -> None:
+    config = tmp_path / "site.toml"
+    config.write_text(f'basemap.tiles = "{tmp_path}/map.pmtiles"\n')
+    ended = python("-c", without(*MAPS) + COMMAND, "serve", f"--config={config}", "--port=0", timeout_s=COMPILING_S)
+    sentence = "basemap.tiles needs the extra `maps`: pip install 'dropanchor-service[maps]'"
+    assert (ended.returncode, ended.stderr.splitlines()[-1]) == (2, f"dropanchor serve: {sentence}")

@@ -17,9 +17,8 @@ from dropanchor_schemas.site import Anchor, Site
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api import create_app
 from dropanchor_service.api.http.rates import RateLimiter
-from dropanchor_service.api.omlox.items import OmloxItems
-from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.basemap.basemap import ServedBasemap
+from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
 from dropanchor_service.history.postgresql.database import Database
 from dropanchor_service.history.postgresql.store import PostgresqlStorage
@@ -30,6 +29,7 @@ from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.identity import Authenticator
 from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTable
+from dropanchor_service.store.omlox_items import OmloxItems
 
 T_NS = 1_800_000_000_000_000_000
 

@@ -10,6 +10,7 @@ import pytest
 from playwright.sync_api import Page
 
 from support.browser import every_look
+from support.patience import PATIENCE_S
 
 _PACKAGE = "axe-core@4.10.3"
 
@@ -34,7 +35,7 @@ def _downloaded(folder: Path) -> bytes:
         pytest.skip("npm is not installed: the accessibility tests fetch axe-core with it")
     command = [npm, "pack", _PACKAGE, "--silent", "--pack-destination", str(folder)]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     except subprocess.TimeoutExpired:
         pytest.skip("npm did not deliver axe-core within 120 s: the accessibility tests need it")
     packed = list(folder.glob("axe-core-*.tgz"))

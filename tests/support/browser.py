@@ -10,7 +10,9 @@ from typing import Any, Literal
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
-expect.set_options(timeout=40_000)  # the machine may be busy
+from support.patience import PATIENCE_S
+
+expect.set_options(timeout=1000 * PATIENCE_S)
 _EXECUTABLES = ("chromium-headless-shell", "chromium", "chromium-browser")
 _ARGUMENTS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 Scheme = Literal["light", "dark"]
@@ -71,7 +73,7 @@ class WatchedPage:
         tags: list[dict[str, Any]] = self.page.evaluate("dropanchor.tags()")
         return {tag["tag"]: tag for tag in tags}
 
-    def wait_for(self, condition: str, timeout_s: float = 40) -> None:
+    def wait_for(self, condition: str, timeout_s: float = PATIENCE_S) -> None:
         """Wait until a JavaScript expression is true.
 
         The expression is evaluated from outside, since the content security policy forbids it inside the page.
@@ -139,6 +141,7 @@ def open_page(
         reduced_motion=reduced_motion,
         locale=locale,
     )
+    context.set_default_timeout(1000 * PATIENCE_S)
     watched = WatchedPage(context.new_page())
     page = watched.page
     prepare(page)

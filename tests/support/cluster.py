@@ -15,6 +15,7 @@ import pytest
 from psycopg.errors import UndefinedTable
 
 from support.kernel_cache import compile_once
+from support.patience import PATIENCE_S
 from support.postgresql import Postgresql
 from support.service import command, environment
 from support.zenoh_router import free_port, wait_until
@@ -124,7 +125,7 @@ class Cluster:
     def stop(self, name: str) -> None:
         """Stop a node as an operator does."""
         self._processes[name].terminate()
-        self._processes.pop(name).wait(60)
+        self._processes.pop(name).wait(PATIENCE_S)
 
     def kill_raylet(self, name: str) -> None:
         """Kill the process of Ray that starts the shards of a node, and wait until they have ended."""
@@ -132,7 +133,7 @@ class Cluster:
         raylet = next(number for number, line in every if "raylet/raylet" in line)
         shards = descendants(raylet)
         os.kill(raylet, signal.SIGKILL)
-        wait_until(lambda: not any(map(_runs, shards)), 60.0)
+        wait_until(lambda: not any(map(_runs, shards)))
 
     def processes(self) -> dict[int, str]:
         """Return all processes of all nodes, each with its command line."""
@@ -153,7 +154,7 @@ class Cluster:
 
     def wait(self, name: str) -> int:
         """Wait until the process of a node ends, and return its exit code."""
-        return self._processes[name].wait(60)
+        return self._processes[name].wait(PATIENCE_S)
 
     def owners(self) -> dict[str, str]:
         """Return the shard that owns each bucket."""

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 _ROOT = Path(__file__).parents[2]
-_PACKAGES = os.pathsep.join(str(_ROOT / name) for name in ("schemas", "tag_client", "service"))
+_PACKAGES = os.pathsep.join(str(_ROOT / name) for name in ("schemas", "tag_client", "service", "service/evaluation"))
 
 
 def environment() -> dict[str, str]:

@@ -21,12 +21,17 @@ EXAMPLES = int(os.environ.get("DROPANCHOR_CONTRACT_EXAMPLES", "10"))
 ANSWER_S = 120.0  # at most: some operations start a process, and the machine may be busy
 
 
-def operations_of(app: FastAPI, path: str, over_http: bool = False) -> dict[str, Operation]:
-    """Return the operations of the document at this path, by their ids. over_http: to send them to an address."""
+def operations_of(app: FastAPI, path: str, names: Iterable[str], over_http: bool = False) -> dict[str, Operation]:
+    """Return the operations of the document at this path, by their ids. over_http: to send them to an address.
+
+    names: all of their ids, which the tests have from a document that takes no time to make.
+    """
     load_all_checks()
     found = schemathesis.openapi.from_dict(app.openapi()) if over_http else schemathesis.openapi.from_asgi(path, app)
     operations = [each.ok() for each in found.get_all_operations() if isinstance(each, Ok)]
-    return {operation.definition.raw["operationId"]: operation for operation in operations}
+    by_id = {operation.definition.raw["operationId"]: operation for operation in operations}
+    assert by_id.keys() == set(names)
+    return by_id
 
 
 def assert_follows_the_document(

@@ -46,7 +46,9 @@ class EventBench:
         """Start the service's part again, from what is stored."""
         self.store = EventStore(self.database, "yard", self._addressees)
         answers = self.poses.answers
-        site = WatchedSite(answers.site, answers.tags, self.health, self.items, self.store.states())
+        site = WatchedSite(
+            answers.site, answers.tags, self.health, self.items, self.store.states(), self.store.starts()
+        )
         self.watcher = Watcher([site], answers.latest, lambda: self.poses.now_ns)
         self.thread = EventThread(self.watcher, [self.store], KEEP, lambda: self.poses.now_ns, 0.1)
 

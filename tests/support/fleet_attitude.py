@@ -18,7 +18,7 @@ from support.imu import G0, Motion
 Array = NDArray[Any]
 
 
-@njit
+@njit(cache=True)
 def follow(a: Any, t: Array, acc: Array, gyro: Array, rest_until: float, q: Array) -> None:
     for k in range(len(t)):
         dt = t[k] - t[k - 1] if k else 0.0

@@ -20,7 +20,7 @@ def nanoseconds(t: Array) -> Array:
     return START_NS + np.round(t * 1e9).astype(np.int64)
 
 
-@njit
+@njit(cache=True)
 def drive(f: Any, t: Array, acc: Array, gyro: Array, mag: Array, ends: Array, nodes: Array) -> None:
     """Feed the samples up to each end and close a node there. Then feed the samples after the last end."""
     k = 0
@@ -44,6 +44,6 @@ def new_frontend(hard_iron: float = 1.0, declination: float = 0.0) -> Array:
 def run(rows: Array, m: Motion, ends: Array) -> Array:
     """Feed a motion to the front-end and return its nodes at the times `ends` (n,) in s; (n,) NODE."""
     nodes = np.zeros(len(ends), NODE)
-    columns = [np.ascontiguousarray(c) for c in (m.acc, m.gyro, m.mag)]
-    drive(rows[0], nanoseconds(m.t), *columns, nanoseconds(ends), nodes)
+    acc, gyro, mag = map(np.ascontiguousarray, (m.acc, m.gyro, m.mag))
+    drive(rows[0], nanoseconds(m.t), acc, gyro, mag, nanoseconds(ends), nodes)
     return nodes

@@ -44,11 +44,12 @@ def follow(blocks: list[Block], folder: Path, url: str) -> str:
         if block.file:
             (folder / block.file).write_text(text)
         elif block.language == "sh":
-            said.append(_run(text, folder))
+            said.append(run(text, folder))
     return "".join(said)
 
 
-def _run(script: str, folder: Path) -> str:
+def run(script: str, folder: Path) -> str:
+    """Run a script of the shell in a folder, and return what it prints. Fails when it does."""
     programs = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     done = subprocess.run(
         ["bash", "-euc", script],

@@ -10,6 +10,7 @@ from starlette.types import ASGIApp
 from dropanchor_service.api.http.limits import GuardedProtocol
 from dropanchor_service.api.http.server import build_server, listen
 from dropanchor_service.security.certificate import Certificate
+from support.patience import PATIENCE_S
 from support.zenoh_router import wait_until
 
 
@@ -31,6 +32,6 @@ def running_server(
         yield socket.getsockname()[1]
     finally:
         server.ask_to_stop()
-        thread.join(timeout=60)
+        thread.join(PATIENCE_S)
         assert not thread.is_alive()
         socket.close()

@@ -1,4 +1,4 @@
-"""A numba cache that depends on all sources.
+"""A numba cache that depends on all sources of kernels that other files call.
 
 numba checks only the file of the outermost kernel. After a change in a file that the kernel calls, numba would still
 run the old code. So the folder of the cache is named after a digest of the sources. Set it before numba is imported.
@@ -15,6 +15,12 @@ from pathlib import Path
 from support.commands import environment
 
 ROOT = Path(__file__).parents[2]
+_REST = """
+from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_front_end, warm_up_ingest, warm_up_zones
+
+for warm_up in (warm_up_front_end, warm_up_ingest, warm_up_answers, warm_up_zones):
+    warm_up()
+"""
 
 
 def use_cache_of_these_sources() -> None:
@@ -25,9 +31,7 @@ def use_cache_of_these_sources() -> None:
         for name in ("estimation", "ingest/kernels", "answers/kernels", "zones")
         for source in sorted((package / name).rglob("*.py"))
     ]
-    digest = hashlib.sha256(
-        b"".join(source.read_bytes() for source in [*sources, *sorted(ROOT.glob("tests/support/*.py"))])
-    )
+    digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources))
     os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / digest.hexdigest()[:16]))
 
 
@@ -41,8 +45,21 @@ def compile_once() -> None:
         subprocess.run([sys.executable, "-m", "dropanchor_service", "compile"], env=environment(), check=True)
 
 
-def compile_smoothers() -> None:
-    """Add the kernels that only smoothing needs. Otherwise several tests compile them, each for half a minute."""
+def compile_with_smoothers() -> None:
+    """Fill the cache with what the service and the tests of smoothing need, on two processors.
+
+    The smoothers follow the belief in its process, which has compiled most of what they call.
+    """
+    from dropanchor_service.engines.warm_up import warm_up_belief
+
+    with subprocess.Popen([sys.executable, "-c", _REST], env=environment()) as rest:
+        warm_up_belief()
+    assert rest.returncode == 0
+    _compile_smoothers()
+    compile_once()  # finds all, and notes that the cache is full
+
+
+def _compile_smoothers() -> None:
     from dropanchor_service.estimation.fleet.smoother.smoothed import smoothed_poses
     from support.fleet_runs import traced
 
@@ -53,5 +70,4 @@ def compile_smoothers() -> None:
 
 if __name__ == "__main__":
     use_cache_of_these_sources()
-    compile_once()
-    compile_smoothers()
+    compile_with_smoothers()

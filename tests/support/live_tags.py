@@ -20,6 +20,7 @@ from dropanchor_tag_client import TagClient
 from dropanchor_tag_client.simulator.live import Delivery, deliveries, start_poses, tag_name
 from dropanchor_tag_client.simulator.sensors import preset
 from support.ingest import IngestBench
+from support.patience import PATIENCE_S
 from support.service import Running
 from support.zenoh_router import wait_until
 
@@ -79,7 +80,7 @@ class LiveTags:
                     cache_messages=self._cache_messages,
                     clock="boot" if self._boot_clock else "utc",
                     batch_s=None,
-                    connect_timeout_s=30.0,
+                    connect_timeout_s=PATIENCE_S,
                 )
             )
             for index in range(self._tags)

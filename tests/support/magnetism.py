@@ -10,6 +10,7 @@ from dropanchor_schemas.wire import ImuSample, Vector
 Array = NDArray[np.float64]
 FIELD_UT = np.array([0.0, 20.0, -44.0])  # north and down
 _RATE_HZ = 100
+_PERIOD_NS = 1_000_000_000 // _RATE_HZ
 _T0_NS = 1_800_000_000_000_000_000
 
 
@@ -39,36 +40,34 @@ def samples(
     u = np.concatenate([np.zeros(rest), np.linspace(0.0, 1.0, motion)])
     yaw, roll, pitch = 2 * np.pi * turns * u, tilt_rad * np.sin(26 * u), tilt_rad * np.sin(41 * u)
     shape = soft_iron() if errors.soft_iron is None else errors.soft_iron
-    found = []
-    bodies = [rotation(*angles) for angles in zip(yaw, pitch, roll, strict=True)]
-    for i, body_from_east in enumerate(bodies):
-        moving = i >= rest
-        rate = _rate(body_from_east, bodies[i - 1]) if moving else np.zeros(3)
-        acc = body_from_east @ [0.0, 0.0, 9.80665] / errors.acc_scale + rng.normal(0, 0.5 if moving else 0.03, 3)
-        gyro = rate + errors.gyro_bias + rng.normal(0, 0.003, 3)
-        mag = shape @ (body_from_east @ FIELD_UT) + errors.hard_iron + rng.normal(0, errors.mag_noise_ut, 3)
-        t_ns = _T0_NS + i * 1_000_000_000 // _RATE_HZ
-        found.append(ImuSample(t_ns, _vector(acc), _vector(gyro), _vector(mag)))
-    return found
+    bodies = rotation(yaw, pitch, roll)
+    moving = (np.arange(len(u)) >= rest)[:, None]
+    noise = rng.standard_normal((3, len(u), 3))
+    acc = bodies @ [0.0, 0.0, 9.80665] / errors.acc_scale + noise[0] * np.where(moving, 0.5, 0.03)
+    gyro = np.where(moving, _rates(bodies), 0.0) + errors.gyro_bias + noise[1] * 0.003
+    mag = bodies @ FIELD_UT @ shape.T + errors.hard_iron + noise[2] * errors.mag_noise_ut
+    columns = [[(x, y, z) for x, y, z in column.tolist()] for column in (acc, gyro, mag)]
+    times_ns = range(_T0_NS, _T0_NS + len(u) * _PERIOD_NS, _PERIOD_NS)
+    return [ImuSample(*sample) for sample in zip(times_ns, *columns, strict=True)]
 
 
-def rotation(yaw: float, pitch: float, roll: float) -> Array:
-    """Return the rotation from east-north-up to the body."""
-    (cy, cp, cr), (sy, sp, sr) = np.cos([yaw, pitch, roll]), np.sin([yaw, pitch, roll])
-    about_z = np.array([[cy, sy, 0], [-sy, cy, 0], [0, 0, 1]])
-    about_y = np.array([[cp, 0, -sp], [0, 1, 0], [sp, 0, cp]])
-    about_x = np.array([[1, 0, 0], [0, cr, sr], [0, -sr, cr]])
-    found: Array = about_x @ about_y @ about_z
-    return found
+def rotation(yaw: float | Array, pitch: float | Array, roll: float | Array) -> Array:
+    """Return the rotations from east-north-up to the body, (3, 3) or (n, 3, 3)."""
+    angles = yaw, pitch, roll
+    (cy, cp, cr), (sy, sp, sr) = map(np.cos, angles), map(np.sin, angles)
+    no, one = np.zeros_like(cy), np.ones_like(cy)
+    about_z = _matrices([[cy, sy, no], [-sy, cy, no], [no, no, one]])
+    about_y = _matrices([[cp, no, -sp], [no, one, no], [sp, no, cp]])
+    about_x = _matrices([[one, no, no], [no, cr, sr], [no, -sr, cr]])
+    return about_x @ about_y @ about_z
 
 
-def _rate(now: Array, before: Array) -> Array:
-    turned = before @ now.T
-    return (
-        np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]) * _RATE_HZ / 2
-    )
+def _matrices(rows: list[list[Array]]) -> Array:
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def _vector(values: Array) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
+def _rates(bodies: Array) -> Array:
+    """Return how fast the body turns into each rotation, (n, 3), rad/s."""
+    turned = np.roll(bodies, 1, axis=0) @ np.swapaxes(bodies, 1, 2)
+    twice = [turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]]
+    return np.stack(twice, axis=1) * _RATE_HZ / 2

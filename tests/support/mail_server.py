@@ -1,9 +1,10 @@
 """A real SMTP server on loopback, in a thread of the test."""
 
+import socket
 import ssl
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from email import message_from_bytes
 from email.message import EmailMessage
@@ -13,7 +14,7 @@ from typing import Any
 from aiosmtpd.controller import Controller
 from aiosmtpd.smtp import SMTP, AuthResult, Envelope, LoginPassword, Session
 
-from support.zenoh_router import free_port
+from support.zenoh_router import free_port, wait_until
 
 
 @dataclass
@@ -59,15 +60,48 @@ class MailServer:
         return "\n".join(mail.get_content() for mail in list(self.mails))
 
 
+class _Listener(socket.socket):
+    """A listening socket that knows the connections that it has accepted."""
+
+    def __init__(self, port: int) -> None:
+        super().__init__(socket.AF_INET, socket.SOCK_STREAM)
+        self.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        self.bind(("127.0.0.1", port))
+        self._accepted: list[socket.socket] = []
+
+    def accept(self) -> tuple[socket.socket, Any]:
+        connection, address = super().accept()
+        self._accepted.append(connection)
+        return connection, address
+
+    def end_all(self) -> None:
+        """End the connections, also in the midst of a TLS handshake, and wait until asyncio has closed them."""
+        for connection in self._accepted:
+            with suppress(OSError):  # it has ended
+                connection.shutdown(socket.SHUT_RDWR)
+        wait_until(lambda: all(connection.fileno() == -1 for connection in self._accepted))
+
+
+class _Controller(Controller):
+    """Serves on a socket that is already bound. A controller alone leaves connections open that use TLS."""
+
+    def __init__(self, handler: MailServer, listener: _Listener, **options: Any) -> None:
+        super().__init__(handler, hostname="127.0.0.1", port=handler.port, **options)
+        self._listener = listener
+
+    def _create_server(self) -> Any:
+        return self.loop.create_server(self._factory_invoker, sock=self._listener, ssl=self.ssl_context)
+
+
 @contextmanager
 def running_mail_server(
     server: MailServer, tls: ssl.SSLContext | None = None, starttls: ssl.SSLContext | None = None
 ) -> Iterator[None]:
     """Serve until the block ends. tls: TLS from the first byte. starttls: TLS on request, and required."""
-    controller = Controller(
+    listener = _Listener(server.port)
+    controller = _Controller(
         server,
-        hostname="127.0.0.1",
-        port=server.port,
+        listener,
         ssl_context=tls,
         tls_context=starttls,
         require_starttls=starttls is not None,
@@ -80,4 +114,5 @@ def running_mail_server(
     try:
         yield
     finally:
+        listener.end_all()
         controller.stop()

@@ -11,6 +11,7 @@ import pytest
 from paho.mqtt.client import Client
 
 from support.commands import start_python
+from support.patience import PATIENCE_S
 
 
 @contextmanager
@@ -21,7 +22,7 @@ def bridge(endpoint: str, broker: str, *arguments: str) -> Iterator["subprocess.
         yield process
     finally:
         process.terminate()
-        process.communicate(timeout=30)
+        process.communicate(timeout=PATIENCE_S)
 
 
 def wait_for_line(process: "subprocess.Popen[str]", text: str) -> str:

@@ -13,9 +13,9 @@ from websockets.sync.client import ClientConnection, connect
 
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.api.http.rates import RateLimiter
-from dropanchor_service.api.omlox.items import OmloxItems
-from dropanchor_service.api.routes.event_parts import EventParts
+from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.security.identity import Authenticator
+from dropanchor_service.store.omlox_items import OmloxItems
 from support.api import ApiBench, ask, kind_of, make_api_bench
 from support.events import EventBench
 from support.http_server import running_server

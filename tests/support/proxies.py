@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from support.certificate import self_signed
+from support.patience import PATIENCE_S
 from support.service import ROOT
 from support.zenoh_router import free_port
 
@@ -77,4 +78,4 @@ def _running(command: list[str]) -> Iterator[None]:
             yield
         finally:
             process.terminate()
-            process.wait(30.0)
+            process.wait(PATIENCE_S)

@@ -10,6 +10,8 @@ from typing import Any
 
 import orjson
 
+from support.patience import PATIENCE_S
+
 
 @dataclass
 class Receiver:
@@ -31,7 +33,7 @@ class Receiver:
     def take(self, headers: dict[str, str], body: bytes) -> int:
         with self.lock:
             self.arrived += 1
-        self.release.wait(30.0)
+        self.release.wait(PATIENCE_S)
         event = orjson.loads(body)
         with self.lock:
             self.requests.append((headers, body))

@@ -1,6 +1,6 @@
-"""Every sentence with which the service can refuse a change that the page sends.
+"""The sentences with which the service refuses a change that the page sends.
 
-The code is read for the sentences that it holds. Those of Pydantic come from wrong values in every place of the models.
+The code is read for sentences without a code. Those of Pydantic come from wrong values in every place of the models.
 """
 
 import ast
@@ -54,7 +54,6 @@ SAYING = {
     ),
 }
 """What is called with a sentence, as its last text."""
-VALUE = "17"
 
 WRONG: tuple[Any, ...] = (
     *(None, "", " ", "x" * 3000, "\n", "-", -1e12, 1e12, math.nan, -1, 1.5, True, {}, [], [[]], [1] * 300),
@@ -79,8 +78,8 @@ BODIES: tuple[tuple[Any, Any], ...] = (
 )
 
 
-def sentences_of_the_code() -> set[str]:
-    """Return the sentences that stand in the code, with VALUE in each place for a value."""
+def refusals_without_a_code() -> set[str]:
+    """Return the sentences in the code that the page may show although it cannot know them."""
     hidden = {name for names in NOT_SHOWN.values() for name in names}
     folders = [SERVICE / folder for folder in FOLDERS]
     files = [file for folder in folders for file in sorted(folder.rglob("*.py")) if file.stem not in hidden]
@@ -100,9 +99,9 @@ def _sentences(file: Path) -> Iterator[str]:
             continue
         name = call.func.id if isinstance(call.func, ast.Name) else getattr(call.func, "attr", "")
         for said in _choices(call.args[-1], texts) if name in SAYING else ():
-            text = _text_of(said, texts)
-            if any(letter.isalpha() for letter in text.replace("body.shape", "").replace("path.tag", "")):
-                yield text[0].upper() + text[1:] + "." if name == "RefusedError" else text
+            text = _text_of(said)
+            if any(letter.isalpha() for letter in text):
+                yield f"{file.name}: {text}"
 
 
 def _texts_by_name(tree: ast.Module) -> dict[str, list[ast.expr]]:
@@ -128,16 +127,14 @@ def _choices(node: ast.expr, texts: dict[str, list[ast.expr]]) -> list[ast.expr]
     return [node]
 
 
-def _text_of(node: ast.expr, texts: dict[str, list[ast.expr]]) -> str:
-    """Return a text; what is not known before the service runs is VALUE."""
+def _text_of(node: ast.expr) -> str:
+    """Return the text that an expression holds itself."""
     match node:
         case ast.Constant(value=str(text)):
             return text
         case ast.JoinedStr(values=parts):
-            return "".join(_text_of(part, texts) for part in parts)
-        case ast.FormattedValue(value=ast.Name(id=name)) if name.isupper() and name in texts:
-            return _text_of(texts[name][0], texts)
-    return VALUE
+            return "".join(map(_text_of, parts))
+    return ""
 
 
 def _about(adapter: TypeAdapter[Any], example: Any) -> Iterator[str]:

@@ -11,6 +11,9 @@ import zenoh
 HEADER = b"\x00\x01\x00\x00"  # plain CDR, little-endian
 IMU = "sensor_msgs::msg::dds_::Imu_/RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"
 RANGE = "sensor_msgs::msg::dds_::Range_/RIHS01_b42b62562e93cbfe9d42b82fe5994dfa3d63d7d5c90a317981703f7388adff3a"
+PRESSURE = (
+    "sensor_msgs::msg::dds_::FluidPressure_/RIHS01_22dfb2b145a0bd5a31a1ac3882a1b32148b51d9b2f3bab250290d66f3595bc32"
+)
 POSE = (
     "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_/"
     "RIHS01_26432f9803e43727d3c8f668d1fdb3c630f548af631e2f4e31382371bfea3b6e"
@@ -86,6 +89,11 @@ def imu_cdr(t_ns: int, acc: tuple[float, ...], gyro: tuple[float, ...], covarian
 def range_cdr(t_ns: int, range_m: float, variance: float = 0.01, max_range: float = 100.0) -> bytes:
     """Return a sensor_msgs/Range."""
     return CdrWriter().header(t_ns, "uwb").add("B", 0).add("f", 0.1, 0.0, max_range, range_m, variance).cdr
+
+
+def pressure_cdr(t_ns: int, pressure_pa: float) -> bytes:
+    """Return a sensor_msgs/FluidPressure."""
+    return CdrWriter().header(t_ns, "barometer").add("d", pressure_pa, 0.0).cdr
 
 
 def read_pose(reader: CdrReader) -> tuple[list[float], float, list[float]]:

@@ -44,7 +44,7 @@ def running_s3() -> Iterator[S3]:
     try:
         with patch.dict(os.environ, server.environment):
             S3FileSystem.clear_instance_cache()  # it would go on with another server
-            wait_until(lambda: _put_bucket(port), 120.0)
+            wait_until(lambda: _put_bucket(port))
             yield server
     finally:
         server.stop()
@@ -52,7 +52,7 @@ def running_s3() -> Iterator[S3]:
 
 def _put_bucket(port: int) -> bool:
     try:
-        with httpx.Client(trust_env=False) as client:
+        with httpx.Client(trust_env=False, verify=False) as client:
             return client.put(f"http://127.0.0.1:{port}/{BUCKET}").is_success
     except httpx.HTTPError:
         return False

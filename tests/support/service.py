@@ -19,6 +19,7 @@ import httpx
 
 from dropanchor_schemas.wire import Frame, HeadingSample, ImuSample, RangeSample
 from support.kernel_cache import compile_once
+from support.patience import PATIENCE_S
 from support.zenoh_router import free_endpoint, wait_until
 
 ROOT = Path(__file__).parents[2]
@@ -43,7 +44,7 @@ class Running:
     def ask(self, method: str, path: str, **options: Any) -> httpx.Response:
         # Without `ca` there is no TLS. Loading the usual authorities would take longer than most answers.
         trusted = False if self.ca is None else ssl.create_default_context(cafile=self.ca)
-        with httpx.Client(verify=trusted, timeout=60.0, trust_env=False) as client:
+        with httpx.Client(verify=trusted, trust_env=False) as client:
             return client.request(method, f"{self.url}{path}", **options)
 
     def get(self, path: str) -> Any:
@@ -58,7 +59,7 @@ class Running:
         found = re.search(rf"^{re.escape(sample)} (\S+)$", text, re.MULTILINE)
         return float(found[1]) if found else 0.0
 
-    def stop(self, how: signal.Signals = signal.SIGTERM, timeout_s: float = 60.0) -> int:
+    def stop(self, how: signal.Signals = signal.SIGTERM, timeout_s: float = PATIENCE_S) -> int:
         """Send a signal, wait until the process ends, and return its exit code."""
         self.process.send_signal(how)
         return self.process.wait(timeout_s)
@@ -71,7 +72,7 @@ def command(*arguments: str) -> list[str]:
 def environment(**more: str) -> dict[str, str]:
     """Return this process's environment without its Dropanchor settings, with our packages and these variables."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith("DROPANCHOR_")}
-    packages = os.pathsep.join(str(ROOT / name) for name in ("schemas", "tag_client", "service"))
+    packages = os.pathsep.join(str(ROOT / name) for name in ("schemas", "tag_client", "service", "service/evaluation"))
     return clean | {"PYTHONPATH": packages} | more
 
 
@@ -121,7 +122,7 @@ def running_router(*arguments: str) -> Iterator[None]:
             yield
         finally:
             process.send_signal(signal.SIGTERM)
-            process.wait(60)
+            process.wait(PATIENCE_S)
 
 
 def _read(running: Running) -> None:

@@ -8,6 +8,8 @@ from typing import Any
 
 from playwright.sync_api import Browser, Page
 
+from support.patience import PATIENCE_S
+
 PHONE = (390, 844)
 SENSORS = """
     const step_ms = 1000 / 60;
@@ -145,6 +147,7 @@ def tag_page(browser: Browser, url: str, *scripts: str, **options: Any) -> Itera
     context = browser.new_context(viewport={"width": PHONE[0], "height": PHONE[1]}, **options)
     for script in (SENSORS, *scripts):
         context.add_init_script(f"{{ {script} }}")
+    context.set_default_timeout(1000 * PATIENCE_S)
     opened = TagPage(context.new_page())
     opened.page.on("pageerror", lambda error: opened.errors.append(str(error)))
     opened.page.on("console", lambda line: _note(opened.errors, line.type, line.text))

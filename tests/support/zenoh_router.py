@@ -15,6 +15,8 @@ from typing import Any
 
 import zenoh
 
+from support.patience import PATIENCE_S
+
 _ROUTER_PROGRAM = """
 import sys, zenoh
 with zenoh.open(zenoh.Config.from_json5(sys.argv[1])):
@@ -52,7 +54,7 @@ def free_endpoint() -> str:
 def configuration(mode: str, endpoints: list[str], extra: dict[str, Any] | None = None) -> str:
     """Return the JSON5 of a router that listens at the endpoints, or of a client that connects to one of them."""
     retry = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
-    connect = {"endpoints": endpoints, "timeout_ms": 5000, "exit_on_failure": True, "retry": retry}
+    connect = {"endpoints": endpoints, "timeout_ms": round(1000 * PATIENCE_S), "exit_on_failure": True, "retry": retry}
     role = {"listen": {"endpoints": endpoints}} if mode == "router" else {"connect": connect}
     quiet = {"scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}}}
     transport = {"shared_memory": {"enabled": False}, **(extra or {})}
@@ -106,7 +108,7 @@ def dropping_router(key: str) -> Iterator[str]:
         yield endpoint
 
 
-def wait_until(condition: Callable[[], object], timeout_s: float = 40.0) -> None:
+def wait_until(condition: Callable[[], object], timeout_s: float = PATIENCE_S) -> None:
     """Wait until the condition is true. Fail the test when it is still false after `timeout_s`."""
     deadline, pause_s = time.monotonic() + timeout_s, 0.005
     while not condition():

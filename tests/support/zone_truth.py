@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
+from dropanchor_evaluation.simulated import PriorKnowledge, batches, configure, merged, samples_of
 from dropanchor_schemas.zones import Polygon, Zone
 from dropanchor_service.estimation.columns import Array, Frame, State
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.evaluation.simulated import PriorKnowledge, batches, configure, merged, samples_of
 from dropanchor_service.store import LatestPoses
 from dropanchor_service.store.groups import Groups
 from dropanchor_service.zones.judge import ENTER

@@ -9,6 +9,7 @@ import pytest
 from dropanchor_tag_client.cli import main
 from support.commands import python, start_python
 from support.listening import listening
+from support.patience import PATIENCE_S
 from support.zenoh_router import free_endpoint, wait_until
 
 COMMAND = ("-m", "dropanchor_tag_client")
@@ -83,7 +84,7 @@ def test_a_signal_ends_a_replay_quickly_and_buffered_samples_are_sent(
             wait_until(lambda: len(heard.ranges()) >= 3)
             began = time.monotonic()
             process.send_signal(number)
-            process.wait(60)
+            process.wait(PATIENCE_S)
             assert time.monotonic() - began < 30.0
         finally:
             process.kill()
@@ -100,7 +101,7 @@ def test_ctrl_c_ends_a_client_that_is_still_connecting(recording: Path) -> None:
         assert process.stderr is not None
         assert f"Cannot connect to {endpoint}" in process.stderr.readline()
         process.send_signal(signal.SIGINT)
-        assert process.wait(60.0) == -signal.SIGINT
+        assert process.wait(PATIENCE_S) == -signal.SIGINT
     finally:
         process.kill()
         process.communicate()

@@ -28,6 +28,7 @@ def test_every_kind_of_sample_arrives_in_either_encoding(
             tag.publish_imu((0.5, 0.25, 9.75), (0.0, 0.0, 1.0), (1.0, 2.0, 3.0), t_ns=T + 1000)
             tag.publish_heading(1.5, t_ns=T + 2000)
             tag.publish_bearing(7, -0.5, t_ns=T + 3000, std_rad=0.125)
+            tag.publish_pressure(101_325, t_ns=T + 4000, temperature_c=21.5)
         wait_until(lambda: heard.frames)
     (frame,) = heard.frames
     assert heard.keys == ["dropanchor/@v1/default/tag/tag%201/samples"]
@@ -36,6 +37,7 @@ def test_every_kind_of_sample_arrives_in_either_encoding(
     assert frame.headings[0][:2] == (T + 2000, 1.5)
     assert math.isnan(frame.headings[0].std_rad)
     assert frame.bearings == [(T + 3000, 7, -0.5, 0.125)]
+    assert frame.pressures == [(T + 4000, 101_325.0, 21.5)]
     assert (frame.sequence, frame.boot_id, frame.boot_clock) == (0, tag.boot_id, False)
     assert frame.anchor_names == ({} if encoding == "packed" else {anchor_number("L0"): "L0"})
 

@@ -82,3 +82,11 @@ def test_a_missing_anchor_is_an_error_that_lists_the_anchors(tmp_path: Path) -> 
     recording = read_recording(write(tmp_path, anchors=ANCHORS, range=RANGES))
     with pytest.raises(RecordingError, match="no anchor 'X'; it has: L0, 7"):
         recording.anchor("X")
+
+
+def test_pressures_are_read_with_the_temperature_of_the_air_where_it_is_known(tmp_path: Path) -> None:
+    text = "t_s,pressure_pa,temperature_c\n0.0,101325,21.5\n0.1,101300,\n"
+    recording = read_recording(write(tmp_path, anchors=ANCHORS, range=RANGES, pressure=text))
+    assert list(recording.pressures["pressure_pa"]) == [101_325.0, 101_300.0]
+    assert recording.pressures["temperature_c"][0] == 21.5
+    assert math.isnan(recording.pressures["temperature_c"][1])

@@ -8,6 +8,7 @@ import pytest
 
 from dropanchor_tag_client import ConnectError, SessionSettings, TagClient
 from support.listening import listening
+from support.patience import PATIENCE_S
 from support.zenoh_router import free_port, running_router, wait_until
 
 needs_openssl = pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates")
@@ -47,7 +48,7 @@ def test_only_a_tag_with_a_certificate_of_the_right_authority_can_connect(tmp_pa
     def client(name: str | None, ca: str = "ours") -> TagClient:
         cert, key = (None, None) if name is None else (tmp_path / f"{name}.pem", tmp_path / f"{name}.key")
         settings = SessionSettings(connect=tls, ca=tmp_path / f"{ca}.pem", cert=cert, key=key)
-        return TagClient("a", connect=settings, connect_timeout_s=20.0 if name == "tag" and ca == "ours" else 0.7)
+        return TagClient("a", connect=settings, connect_timeout_s=PATIENCE_S if name == "tag" and ca == "ours" else 0.7)
 
     with running_router([tls, plain], {"link": {"tls": files}}), listening(plain) as heard:
         with client("tag") as tag:

@@ -12,6 +12,7 @@ import numpy as np
 import orjson
 
 from dropanchor_service.answers.columns import aged_poses, columns_of, ellipse_95
+from dropanchor_service.answers.findings import sentence_of
 from dropanchor_service.answers.json_template import Filled
 from dropanchor_service.answers.pose_at_time import BeforeMemoryError, pose_at
 from dropanchor_service.answers.pose_fields import FRAME_FIELDS, POSE_FIELDS, ellipse_values
@@ -80,7 +81,7 @@ class Answers:
             return hint_about_time(sent_ns)
         found = self.tags.rows.findings.of(tag.row)
         if found:
-            return found[0].sentence
+            return sentence_of(found[0])
         unknown = self.unknown_anchor_of(tag)
         if unknown is None:
             unused = hints_about_unused(np.array([tag.row]), self.tags, self.now_ns())

@@ -3,9 +3,17 @@
 from collections.abc import Iterator
 from typing import Any
 
+from dropanchor_schemas.sentences import phrase_of, say
+from dropanchor_service.answers.findings import sentence_of
 from dropanchor_service.store import HealthTable, Tag
 from dropanchor_service.store.clock_offsets import ClockOffset
 from dropanchor_service.store.health import HealthRecord
+
+_WITH_RANGES, _WITH_MOTION = say("with_ranges", "with the ranges"), say("with_motion", "with the motion")
+_RANGES_ALWAYS = say("ranges_always", "the ranges always come")
+_MOTION_ALWAYS = say("motion_always", "the motion always comes")
+_CORRECTED = say("clock_corrected", "the service corrects this. Let one clock stamp both, or set both clocks")
+_NOT_CORRECTED = say("clock_advice", "let both devices set their time automatically, and check the network")
 
 BATTERY_LOW = 0.2
 SPOOL_RISES = 3  # reports in a row
@@ -32,58 +40,89 @@ def care_of(
     last_ns = max(tag.last_heard_ns or 0, 0 if record is None or tag.last_heard_ns else record.received_ns)
     if last_ns and _age_s(last_ns, now_ns) > NO_CONTACT_S:
         hints["no_contact"] = _no_contact(tag.online, _age_s(last_ns, now_ns))
-    return [*_of_sensors(tag), *({"reason": reason, "hint": hint, "setting": None} for reason, hint in hints.items())]
+    return [*_of_sensors(tag), *(_care(reason, hint, None) for reason, hint in hints.items())]
+
+
+def _care(reason: str, hint: str, setting: dict[str, str | bool] | None) -> dict[str, Any]:
+    return {"reason": reason, "hint": hint, "hint_phrase": phrase_of(hint), "setting": setting}
 
 
 def _of_sensors(tag: Tag) -> Iterator[dict[str, Any]]:
     """Yield a `Care` for each fault of the tag's sensors."""
     for found in tag.rows.findings.of(tag.row):
         setting = None if found.setting is None else dict([found.setting])
-        yield {"reason": "sensor_fault", "hint": found.sentence, "setting": setting}
+        yield _care("sensor_fault", sentence_of(found), setting)
 
 
 def _of_values(record: HealthRecord, majority: str | None) -> dict[str, str]:
-    hints = {}
+    hints: dict[str, str] = {}
     values = record.values
     if values.get("battery_fraction", 1.0) < BATTERY_LOW:
-        hints["battery_low"] = f"The battery is at {values['battery_fraction']:.0%}: charge it."
+        hints["battery_low"] = say(
+            "battery_low", "The battery is at {share}: charge it.", share=f"{values['battery_fraction']:.0%}"
+        )
     firmware = values.get("firmware")
     if None not in (firmware, majority) and firmware != majority:
-        hints["firmware_differs"] = f"Runs firmware {firmware}, most tags run {majority}: update it."
+        hints["firmware_differs"] = say(
+            "firmware_differs",
+            "Runs firmware {firmware}, most tags run {majority}: update it.",
+            firmware=firmware,
+            majority=majority,
+        )
     if record.spool_rises >= SPOOL_RISES:
         megabytes = values["spool_bytes"] / 1e6
-        hints["spool_growing"] = f"Its spool grows ({megabytes:.1f} MB wait): its network is too slow for its data."
+        hints["spool_growing"] = say(
+            "spool_growing",
+            "Its spool grows ({megabytes} MB wait): its network is too slow for its data.",
+            megabytes=f"{megabytes:.1f}",
+        )
     return hints
 
 
 def _clock_hint(offset: ClockOffset) -> str | None:
     """Return what to do about the clocks, None if there is nothing to do."""
-    where = f"The clock of its motion is {_where(offset.offset_s)} that of its ranges"
     if offset.from_motion is not None and offset.disagrees:
-        delay_s = offset.offset_s - offset.from_motion.offset_s
-        late = "the ranges" if delay_s > 0 else "the motion"
-        return (
-            f"{where} by the times of the messages, but {_where(offset.from_motion.offset_s)} by its motion: the "
-            f"messages with {late} probably come {abs(delay_s):.1f} s late. Check their network, and let both devices "
-            "set their time automatically."
-        )
+        return _disagreement(offset.offset_s, offset.from_motion.offset_s)
     if not offset.is_too_large:
         return None
-    side = "the ranges always come" if offset.offset_s > 0 else "the motion always comes"
-    if offset.corrected:
-        return f"{where}, or {side} so late: the service corrects this. Let one clock stamp both, or set both clocks."
-    return f"{where}, or {side} so late: let both devices set their time automatically, and check the network."
+    return say(
+        "clock_offset",
+        "The clock of its motion is {offset} s {side} that of its ranges, or {what} so late: {advice}.",
+        offset=f"{abs(offset.offset_s):.1f}",
+        side=_side(offset.offset_s),
+        what=_RANGES_ALWAYS if offset.offset_s > 0 else _MOTION_ALWAYS,
+        advice=_CORRECTED if offset.corrected else _NOT_CORRECTED,
+    )
 
 
-def _where(offset_s: float) -> str:
-    return f"{abs(offset_s):.1f} s {'ahead of' if offset_s > 0 else 'behind'}"
+def _disagreement(offset_s: float, by_motion_s: float) -> str:
+    """Return what to do where the times of the messages and the motion tell different offsets."""
+    return say(
+        "clocks_disagree",
+        "The clock of its motion is {offset} s {side} that of its ranges by the times of the messages, but {other} s "
+        "{other_side} by its motion: the messages {late} probably come {delay} s late. Check their network, and "
+        "let both devices set their time automatically.",
+        offset=f"{abs(offset_s):.1f}",
+        side=_side(offset_s),
+        other=f"{abs(by_motion_s):.1f}",
+        other_side=_side(by_motion_s),
+        late=_WITH_RANGES if offset_s > by_motion_s else _WITH_MOTION,
+        delay=f"{abs(offset_s - by_motion_s):.1f}",
+    )
+
+
+def _side(offset_s: float) -> str:
+    return say("ahead_of", "ahead of") if offset_s > 0 else say("behind", "behind")
 
 
 def _no_contact(online: bool, age_s: float) -> str:
-    minutes = f"{age_s / 60:.0f} minutes" if age_s < 7200 else f"{age_s / 3600:.0f} hours"
+    if age_s < 7200:
+        time = say("minutes", "{n} minutes", n=f"{age_s / 60:.0f}")
+    else:
+        time = say("hours", "{n} hours", n=f"{age_s / 3600:.0f}")
     if online:
-        return f"Connected, but has sent no samples for {minutes}: check its sensors."
-    return f"Has sent nothing for {minutes}: check its power and its network."
+        return say("no_samples", "Connected, but has sent no samples for {time}: check its sensors.", time=time)
+    return say("no_contact", "Has sent nothing for {time}: check its power and its network.", time=time)
 
 
 def _age_s(t_ns: int, now_ns: int) -> float:

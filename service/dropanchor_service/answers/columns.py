@@ -8,7 +8,7 @@ import numpy as np
 from dropanchor_schemas.pose import StateReason as ReasonName
 from dropanchor_schemas.site import Site
 from dropanchor_service.answers.frames import OwnFrames, in_site_frame, own_frames
-from dropanchor_service.answers.geodesy import lat_lon
+from dropanchor_service.answers.geodesy import altitude, lat_lon
 from dropanchor_service.answers.hints import hints_of, past_hints
 from dropanchor_service.answers.kernels.ageing import STALE_AFTER_S, age_poses, ellipses
 from dropanchor_service.estimation.columns import Array, StateReason
@@ -25,7 +25,8 @@ class PoseColumns:
 
     poses: POSE in the site frame, with states of `frames.STATES`; the other columns are derived from it. own: those in
     frames of the tags' own, None if there are none. hint: index into `hint_texts`. anchor_ids: by the index that the
-    poses hold. lat, lon: degrees, None without a georeference. epoch: of the process, see `SiteStore`.
+    poses hold. floor: index into `floor_names`, -1: not known. lat, lon: degrees, None without a georeference. alt_m:
+    None without its altitude. epoch: of the process, see `SiteStore`.
     """
 
     poses: Array
@@ -39,8 +40,12 @@ class PoseColumns:
     semi_major_m: Array
     semi_minor_m: Array
     angle_rad: Array
+    floor_names: Sequence[str]
+    floor: Array
+    floor_probability: Array
     lat: Array | None
     lon: Array | None
+    alt_m: Array | None
     epoch: int
 
 
@@ -66,7 +71,8 @@ def columns_of(
     published = in_site_frame(aged)
     ellipse = ellipse_95(published["cov"])
     hint_texts, hint = past_hints(aged) if historical else hints_of(aged, site, tags, now_ns)
-    lat, lon = _lat_lon_of(published, site.site)
+    floor, floor_probability = site.floors.likeliest(published)
+    lat, lon, alt_m = _place_on_earth(published, site.site)
     return PoseColumns(
         poses=published,
         own=own_frames(aged),
@@ -79,15 +85,22 @@ def columns_of(
         semi_major_m=ellipse[0],
         semi_minor_m=ellipse[1],
         angle_rad=ellipse[2],
+        floor_names=site.floors.names,
+        floor=floor,
+        floor_probability=floor_probability,
         lat=lat,
         lon=lon,
+        alt_m=alt_m,
         epoch=site.epoch,
     )
 
 
-def _lat_lon_of(poses: Array, site: Site) -> tuple[Array | None, Array | None]:
-    """Return latitude and longitude, NaN where x and y are; None without a georeference."""
-    return (None, None) if site.georeference is None else lat_lon(site.georeference, poses["x"], poses["y"])
+def _place_on_earth(poses: Array, site: Site) -> tuple[Array | None, Array | None, Array | None]:
+    """Return latitude, longitude and altitude, NaN where x, y and z are; None where the site does not know its own."""
+    origin = site.georeference
+    if origin is None:
+        return None, None, None
+    return *lat_lon(origin, poses["x"], poses["y"]), altitude(origin, poses["z"])
 
 
 def aged_poses(poses: Array, age_s: Array) -> Array:

@@ -11,6 +11,7 @@ RATE_NS = 2_000_000_000  # window of the range rate
 MIN_RANGES = 4  # of a range rate
 MINUTE_NS = 60_000_000_000
 
+_HEIGHT_TRACK = {"t_ns": "t_ns", "z": "z", "z_std_m": "z_std"}
 _KINDS = [KindName[kind.name].value for kind in MeasurementKind]
 
 
@@ -28,7 +29,9 @@ def explanation_of(answers: Answers, tag: Tag, last: int) -> Answer | None:
         "hypotheses": pose["hypotheses"],
         "speed": {"speed_mps": pose["speed_mps"]} | _rates(innovations),
         "speed_track": {"t_ns": minute["t_ns"].tolist(), "speed_mps": minute["speed"].tolist()},
+        "height_track": {field: minute[name].tolist() for field, name in _HEIGHT_TRACK.items()},
         "innovations": _innovations(latest, [anchor.id for anchor in answers.site.anchors_by_index()]),
+        "range_errors": _range_errors(innovations),
         "refused": int(np.count_nonzero(~latest["fused"])),
         "samples": dict(tag.samples),
         "arrived": dict(tag.arrived),
@@ -53,8 +56,16 @@ def _innovations(records: Array, anchors: list[str]) -> list[Answer]:
             "p_outlier": p_outlier,
             "fused": fused,
         }
-        for _, t_ns, kind, anchor, measured, predicted, y, S, p_outlier, fused in records.tolist()
+        for _, t_ns, kind, anchor, measured, predicted, y, S, p_outlier, fused, *_ in records.tolist()
     ]
+
+
+def _range_errors(innovations: Array) -> Answer | None:
+    """Return the `RangeErrors` that the newest range told."""
+    ranges = innovations[innovations["kind"] == MeasurementKind.RANGE]
+    if not len(ranges) or not np.isfinite(ranges["white_std"][-1]):
+        return None
+    return {"white_m": float(ranges["white_std"][-1]), "lasting_m": float(ranges["lasting_std"][-1])}
 
 
 def _rates(innovations: Array) -> Answer:

@@ -18,6 +18,11 @@ def lat_lon(origin: Georeference, x: Array, y: Array) -> tuple[Array, Array]:
     return lat, lon
 
 
+def altitude(origin: Georeference, z: Array) -> Array | None:
+    """Return the altitudes, m, of points at these heights of the site; None where that of the site is not known."""
+    return None if origin.alt_m is None else origin.alt_m + z
+
+
 def site_xy(origin: Georeference, lat: Array, lon: Array) -> tuple[Array, Array]:
     """Return the points (x, y) [m] of the site frame below or above these latitudes and longitudes, degrees."""
     cos_r, sin_r = np.cos(origin.rotation_rad), np.sin(origin.rotation_rad)

@@ -1,9 +1,11 @@
 """What a person can do about a pose: from its reason, and from how the samples of the tag arrive."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from dropanchor_schemas.sentences import say
+from dropanchor_service.answers.findings import sentence_of
 from dropanchor_service.answers.unused import hints_about_unused
 from dropanchor_service.estimation.columns import Array, Frame, StateReason
 from dropanchor_service.store.arrivals import BURSTS, FORGOTTEN_BURSTS, LATE_S, RANGE_S, ZEROS
@@ -12,40 +14,107 @@ from dropanchor_service.store.tags import KINDS, TagTable
 from dropanchor_service.store.unknown_anchors import FRESH_NS, hint_about
 from dropanchor_service.store.wrong_times import hint_about_time
 
-_MOVE_HINT = "Walk a few metres, but not straight towards the anchor or away from it."
+_MOVE_HINT = say("several_modes", "Walk a few metres, but not straight towards the anchor or away from it.")
 _HINTS = {
-    StateReason.NO_RANGE: "Too few ranges have arrived: is the anchor on, and is the tag in range?",
-    StateReason.NO_HEADING: "There is no heading yet: the tag must send IMU samples or a platform heading.",
-    StateReason.START_UNKNOWN: "Set where the tag starts (`start` in its settings), or use the engine fleet.",
+    StateReason.NO_RANGE: say("no_range", "Too few ranges have arrived: is the anchor on, and is the tag in range?"),
+    StateReason.NO_HEADING: say(
+        "no_heading", "There is no heading yet: the tag must send IMU samples or a platform heading."
+    ),
+    StateReason.START_UNKNOWN: say(
+        "start_unknown", "Set where the tag starts (`start` in its settings), or use the engine fleet."
+    ),
     StateReason.SEVERAL_MODES: _MOVE_HINT,
     StateReason.RESOLVED: "",
-    StateReason.RANGES_MISSING: "No more ranges arrive: is the anchor on, and is the tag in range?",
-    StateReason.IMU_MISSING: "No IMU samples have arrived for a while: check the tag, then walk a few metres.",
-    StateReason.RANGES_REJECTED: "The ranges contradict the track: is the line of sight free, and is the anchor where "
-    "the site says it is?",
-    StateReason.HEADING_DISTURBED: "Iron or a magnet disturbs the compass: move the tag away from it.",
+    StateReason.RANGES_MISSING: say(
+        "ranges_missing", "No more ranges arrive: is the anchor on, and is the tag in range?"
+    ),
+    StateReason.IMU_MISSING: say(
+        "imu_missing", "No IMU samples have arrived for a while: check the tag, then walk a few metres."
+    ),
+    StateReason.RANGES_REJECTED: say(
+        "ranges_rejected",
+        "The ranges contradict the track: is the line of sight free, and is the anchor where the site says it is?",
+    ),
+    StateReason.HEADING_DISTURBED: say(
+        "heading_disturbed", "Iron or a magnet disturbs the compass: move the tag away from it."
+    ),
     StateReason.UNCERTAIN: _MOVE_HINT,
-    StateReason.FAULT: "The estimate had to start again. If this repeats, check what the tag sends.",
-    StateReason.HEADING_UNSURE: "There is no heading reference, so north is not known: set where the tag starts and "
-    "looks, or add a second anchor.",
-    StateReason.SENSOR_FAULT: "A sensor of this tag failed its check: look at what this tag needs.",
+    StateReason.FAULT: say("fault", "The estimate had to start again. If this repeats, check what the tag sends."),
+    StateReason.HEADING_UNSURE: say(
+        "heading_unsure",
+        "There is no heading reference, so north is not known: set where the tag starts and looks, or add a second "
+        "anchor.",
+    ),
+    StateReason.SENSOR_FAULT: say(
+        "sensor_fault", "A sensor of this tag failed its check: look at what this tag needs."
+    ),
 }
 HINTS = [_HINTS[reason] for reason in StateReason]
-RELATIVE_HINT = (
+RELATIVE_HINT = say(
+    "relative",
     "There is no heading reference, so this track is turned about the anchor by an unknown angle: set where the tag "
-    "starts and looks, or add a second anchor."
+    "starts and looks, or add a second anchor.",
 )
-LATE = "Samples arrive {0} s late: check the clock of the tag, and its network."
-IN_BURSTS = "Samples come in bursts of {0} s: let the tag send smaller batches, and check its network."
-FEW_RANGES = "One range in {0} s is too few: raise the rate of the radio, or bring the tag nearer to the anchor."
-MOUNT_UNKNOWN = "The mounting angle is not known yet: turn left and right once, or set it (`mount_angle_rad`)."
-ALL_ZERO = "Its last {0} ranges are all 0: the radio measures no distance, so check it and the anchor."
-RANGES_COME = "Ranges arrive, but too late or too rarely: check the network, and the rate of the radio."
-MOTION_COMES = "The motion of this tag had a gap, and is used again after some seconds without one: check its network."
-NEEDS_BOTH = "A position needs about 20 s of ranges and of motion samples: {0} and {1} have arrived."
-LAGS = "Its poses come up to {0} s late, because its IMU samples come in batches: shorter ones make them fresher."
+MOUNT_UNKNOWN = say(
+    "mount_unknown",
+    "The mounting angle is not known yet: turn left and right once, or set it (`mount_angle_rad`).",
+)
+RANGES_COME = say(
+    "ranges_come", "Ranges arrive, but too late or too rarely: check the network, and the rate of the radio."
+)
+MOTION_COMES = say(
+    "motion_comes",
+    "The motion of this tag had a gap, and is used again after some seconds without one: check its network.",
+)
 LAG_S = 1.0  # from which on people see that poses come late
 SENDING_S = 2.0  # a tag that has sent nothing for so long no longer sends
+
+
+def late(seconds: int) -> str:
+    return say("late", "Samples arrive {seconds} s late: check the clock of the tag, and its network.", seconds=seconds)
+
+
+def in_bursts(seconds: int) -> str:
+    return say(
+        "in_bursts",
+        "Samples come in bursts of {seconds} s: let the tag send smaller batches, and check its network.",
+        seconds=seconds,
+    )
+
+
+def few_ranges(seconds: int) -> str:
+    return say(
+        "few_ranges",
+        "One range in {seconds} s is too few: raise the rate of the radio, or bring the tag nearer to the anchor.",
+        seconds=seconds,
+    )
+
+
+def all_zero(count: int) -> str:
+    return say(
+        "all_zero",
+        "Its last {count} ranges are all 0: the radio measures no distance, so check it and the anchor.",
+        count=count,
+    )
+
+
+def needs_both(ranges: int, motion: int) -> str:
+    return say(
+        "needs_both",
+        "A position needs about 20 s of ranges and of motion samples: {ranges} and {motion} have arrived.",
+        ranges=ranges,
+        motion=motion,
+    )
+
+
+def lags(seconds: float) -> str:
+    return say(
+        "lags",
+        "Its poses come up to {seconds} s late, because its IMU samples come in batches: shorter ones make them "
+        "fresher.",
+        seconds=f"{seconds:.1f}",
+    )
+
 
 _ALL_HINTS = [*HINTS, RELATIVE_HINT]
 _NO_RANGES = (StateReason.NO_RANGE, StateReason.RANGES_MISSING)
@@ -99,7 +168,7 @@ def _about_sensors(poses: Array, tags: TagTable) -> Iterator[tuple[str, int]]:
     """Yield what is wrong with the sensors of a tag, and the place of its pose."""
     for place in np.flatnonzero(poses["reason"] == StateReason.SENSOR_FAULT).tolist():
         for found in tags.rows.findings.of(int(poses["row"][place]))[:1]:
-            yield found.sentence, place
+            yield sentence_of(found), place
 
 
 def _about_arrivals(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[str, Array]]:
@@ -108,19 +177,19 @@ def _about_arrivals(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple
     age_s, burst_age_s = ((now_ns - arrivals[name]) * 1e-9 for name in ("arrival_ns", "burst_ns"))
     sends = (arrivals["arrival_ns"] > 0) & (age_s < np.maximum(SENDING_S, 2.0 * arrivals["burst_s"]))
     nothing_new, little = np.isin(poses["reason"], _NOTHING_NEW), np.isin(poses["reason"], _LITTLE_KNOWN)
-    in_bursts = (arrivals["bursts"] >= BURSTS) & (burst_age_s < FORGOTTEN_BURSTS * arrivals["burst_s"])
-    late, few = arrivals["delay_s"] >= LATE_S, arrivals["range_s"] > RANGE_S
-    yield from _with_seconds(FEW_RANGES, arrivals["range_s"], sends & few & little)
-    yield from _with_seconds(IN_BURSTS, arrivals["burst_s"], sends & in_bursts & nothing_new)
-    yield from _with_seconds(LATE, arrivals["delay_s"], sends & late & nothing_new)
+    bursts = (arrivals["bursts"] >= BURSTS) & (burst_age_s < FORGOTTEN_BURSTS * arrivals["burst_s"])
+    is_late, few = arrivals["delay_s"] >= LATE_S, arrivals["range_s"] > RANGE_S
+    yield from _with_seconds(few_ranges, arrivals["range_s"], sends & few & little)
+    yield from _with_seconds(in_bursts, arrivals["burst_s"], sends & bursts & nothing_new)
+    yield from _with_seconds(late, arrivals["delay_s"], sends & is_late & nothing_new)
 
 
-def _with_seconds(text: str, seconds: Array, where: Array) -> Iterator[tuple[str, Array]]:
+def _with_seconds(text: Callable[[int], str], seconds: Array, where: Array) -> Iterator[tuple[str, Array]]:
     """Yield the text with each whole number of seconds, and the places that have this number."""
     places = np.flatnonzero(where)
     whole = np.round(seconds[places]).astype(np.int64)
     for number in np.unique(whole).tolist():
-        yield text.format(number), places[whole == number]
+        yield text(number), places[whole == number]
 
 
 def _about_missing(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[str, Array]]:
@@ -139,7 +208,7 @@ def _about_missing(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[
     yield HINTS[StateReason.RANGES_MISSING], places[begins & motion & ~ranges]
     yield HINTS[StateReason.IMU_MISSING], places[begins & ranges & ~motion]
     for i in np.flatnonzero(begins & (ranges == motion)).tolist():
-        yield NEEDS_BOTH.format(*counts[i].tolist()), places[i : i + 1]
+        yield needs_both(*counts[i].tolist()), places[i : i + 1]
 
 
 def _zeros(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[str, int]]:
@@ -148,7 +217,7 @@ def _zeros(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[str, int
     arrivals = tags.arrivals.of(poses["row"][places])
     zero = (arrivals["zeros"] >= ZEROS) & ((now_ns - arrivals["range_ns"]) * 1e-9 < SENDING_S)
     for place, count in zip(places[zero].tolist(), arrivals["zeros"][zero].tolist(), strict=True):
-        yield ALL_ZERO.format(count), place
+        yield all_zero(count), place
 
 
 def _lags(poses: Array, tags: TagTable, hint: Array) -> Iterator[tuple[str, Array]]:
@@ -156,7 +225,7 @@ def _lags(poses: Array, tags: TagTable, hint: Array) -> Iterator[tuple[str, Arra
     lag_s = tags.rows.lag_s(poses["row"])
     places = np.flatnonzero((lag_s >= LAG_S) & (hint == StateReason.RESOLVED))
     for place in places.tolist():
-        yield LAGS.format(f"{lag_s[place]:.1f}"), places[places == place]
+        yield lags(lag_s[place]), places[places == place]
 
 
 def _mounts(poses: Array, site: SiteStore, tags: TagTable) -> list[tuple[str, Array]]:

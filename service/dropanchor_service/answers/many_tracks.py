@@ -9,19 +9,24 @@ import numpy as np
 from dropanchor_schemas.tracks import Between as BetweenName
 from dropanchor_service.answers.columns import ellipse_95
 from dropanchor_service.answers.frames import FRAMES, STATES, published_states
+from dropanchor_service.answers.pose_fields import floor_columns, height_source_values
 from dropanchor_service.estimation.columns import Array, Frame
 from dropanchor_service.history.summaries import RELATIVE, Between
 from dropanchor_service.history.tracks import Tracks
+from dropanchor_service.store.floors import Floors
 
 _BETWEEN = [BetweenName[between.name].value for between in Between]
 
 
 def many_tracks(
-    tracks: Tracks, tags: Sequence[str] | None, from_ns: int, to_ns: int, max_points: int
+    tracks: Tracks, floors: Floors, tags: Sequence[str] | None, from_ns: int, to_ns: int, max_points: int
 ) -> dict[str, Any]:
-    """Return the `Tracks` of these tags, or of all. Raises HistoryError and TooMuchError."""
+    """Return the `Tracks` of these tags, or of all. floors: of the site.
+
+    Raises HistoryError and TooMuchError.
+    """
     found = tracks.overview(tags, from_ns, to_ns, max_points)
-    columns = _columns(found.points["point"], found.points["since_previous"])
+    columns = _columns(found.points["point"], found.points["since_previous"], floors)
     begins = np.searchsorted(found.points["tag"], found.figures["tag"])
     ends = np.searchsorted(found.points["tag"], found.figures["tag"], side="right")
     each = [
@@ -47,7 +52,7 @@ def figures_of(summary: Array) -> dict[str, Any]:
     }
 
 
-def _columns(points: Array, since_previous: Array) -> dict[str, Any]:
+def _columns(points: Array, since_previous: Array, floors: Floors) -> dict[str, Any]:
     """Return the columns of `TrackPoints`."""
     own = (points["state"] & RELATIVE) != 0
     frames = np.where(own, Frame.RELATIVE, Frame.SITE)
@@ -56,6 +61,7 @@ def _columns(points: Array, since_previous: Array) -> dict[str, Any]:
     covariances[:, 0, 1] = covariances[:, 1, 0] = points["cov_xy"]
     major, minor, angle = ellipse_95(covariances)
     numbers = {"x": points["x"], "y": points["y"], "heading_rad": points["heading"], "speed_mps": points["speed"]}
+    heights = {"z": points["z"], "z_std_m": points["z_std"]}
     numbers |= {"sigma_pos_m": points["sigma_pos"], "semi_major_m": major, "semi_minor_m": minor, "angle_rad": angle}
     states = published_states(points["state"] & ~np.uint8(RELATIVE), frames)
     in_site = {name: np.where(own & (name != "speed_mps"), np.nan, values) for name, values in numbers.items()}
@@ -64,7 +70,9 @@ def _columns(points: Array, since_previous: Array) -> dict[str, Any]:
         "state": [STATES[state] for state in states.tolist()],
         "frame": [FRAMES[frame] for frame in frames.tolist()],
         "relative_pose": _relative(numbers, own & np.isfinite(points["x"])),
-        **{name: np.ascontiguousarray(values, np.float32) for name, values in in_site.items()},
+        **{name: np.ascontiguousarray(values, np.float32) for name, values in (in_site | heights).items()},
+        "z_source": height_source_values(points),
+        **floor_columns(floors, points),
         "since_previous": [_BETWEEN[between] for between in since_previous.tolist()],
     }
 

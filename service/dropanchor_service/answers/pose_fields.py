@@ -9,12 +9,15 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from dropanchor_schemas.pose import HeightSource as HeightName
 from dropanchor_schemas.pose import Pose, PoseFrame
+from dropanchor_schemas.sentences import phrase_of
 from dropanchor_service.answers.columns import REASONS, PoseColumns, ellipse_95
 from dropanchor_service.answers.frames import FRAMES, STATES, OwnFrames
 from dropanchor_service.answers.json_template import INTEGER, NUMBER, QUOTED, TEXT, null_for
 from dropanchor_service.answers.kernels.json_numbers import BEYOND
-from dropanchor_service.estimation.columns import Array, State
+from dropanchor_service.estimation.columns import Array, HeightSource, State
+from dropanchor_service.store.floors import Floors
 
 DECIMALS, FRAME_DECIMALS, FINE_DECIMALS = (
     6,
@@ -23,6 +26,7 @@ DECIMALS, FRAME_DECIMALS, FINE_DECIMALS = (
 )  # digits of m, rad and s; of these in a frame; of variances and degrees
 
 _AMBIGUOUS: Final = int(State.AMBIGUOUS)  # NumPy compares with an int faster than with an enum
+_HEIGHT_SOURCES: Final = (None, *(HeightName[source.name].value for source in HeightSource))
 COVARIANCE: Final = [[NUMBER] * 3] * 3
 ELLIPSE: Final = {"semi_major_m": NUMBER, "semi_minor_m": NUMBER, "angle_rad": NUMBER}
 
@@ -187,6 +191,27 @@ _RELATIVE_NUMBERS: Final = {
 }
 
 
+def height_sources(poses: Array) -> tuple[Sequence[str | None], Array]:
+    """Return all sources of heights, and the index of that of each POSE or POINT."""
+    return _HEIGHT_SOURCES, np.where(np.isfinite(poses["z"]), 1 + poses["z_source"], 0)
+
+
+def height_source_values(poses: Array) -> list[str | None]:
+    """Return the source of the height of each POSE or POINT."""
+    every, index = height_sources(poses)
+    return [every[place] for place in index.tolist()]
+
+
+def floor_columns(floors: Floors, poses: Array) -> dict[str, list[Any]]:
+    """Return the columns `floor` and `floor_probability` of POSE or POINT."""
+    floor, probability = floors.likeliest(poses)
+    names = [*floors.names, None]
+    return {
+        "floor": [names[number] for number in floor.tolist()],
+        "floor_probability": np.round(probability, DECIMALS).tolist(),
+    }
+
+
 def _nulls(columns: PoseColumns) -> Sequence[None]:
     return [None] * len(columns.poses)
 
@@ -210,10 +235,16 @@ _TABLE: Final = {
     "state": choice(lambda columns: (STATES, columns.poses["state"])),
     "reason": choice(lambda columns: (REASONS, columns.poses["reason"])),
     "hint": choice(lambda columns: (columns.hint_texts, columns.hint)),
+    "hint_phrase": choice(lambda columns: (list(map(phrase_of, columns.hint_texts)), columns.hint)),
     "frame": choice(lambda columns: (FRAMES, columns.poses["frame"])),
     "relative_pose": PoseField(_relative_json, _relatives, _nulls),  # in frames, as the hypotheses
     "x": engine_number("x"),
     "y": engine_number("y"),
+    "z": engine_number("z"),
+    "z_std_m": engine_number("z_std"),
+    "z_source": choice(lambda columns: height_sources(columns.poses)),
+    "floor": choice(lambda columns: ([None, *columns.floor_names], columns.floor + 1)),
+    "floor_probability": number(lambda columns: columns.floor_probability),
     "heading_rad": engine_number("heading"),
     "speed_mps": engine_number("speed"),
     "yaw_rate_radps": engine_number("yaw_rate"),
@@ -230,6 +261,7 @@ _TABLE: Final = {
     "hypotheses": PoseField(_hypotheses_json, _nulls, _nulls),  # the values come from another table of the store
     "lat": number(lambda columns: columns.lat, FINE_DECIMALS, FINE_DECIMALS),
     "lon": number(lambda columns: columns.lon, FINE_DECIMALS, FINE_DECIMALS),
+    "alt_m": number(lambda columns: columns.alt_m),
     "online": choice(lambda columns: ([False, True], columns.online)),
     "epoch": PoseField(lambda columns: JsonPart([columns.epoch]), _epochs, _epochs),
 }

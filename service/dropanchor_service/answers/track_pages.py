@@ -7,9 +7,14 @@ import numpy as np
 
 from dropanchor_service.answers.columns import REASONS
 from dropanchor_service.answers.frames import FRAMES, STATES, in_site_frame, own_frames
-from dropanchor_service.answers.geodesy import lat_lon
+from dropanchor_service.answers.geodesy import altitude, lat_lon
 from dropanchor_service.answers.pose_at_time import FAR_NS, NoPoseThenError, pose_between
-from dropanchor_service.answers.pose_fields import covariance_values, relative_values
+from dropanchor_service.answers.pose_fields import (
+    covariance_values,
+    floor_columns,
+    height_source_values,
+    relative_values,
+)
 from dropanchor_service.answers.times import isos_utc
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.errors import HistoryError
@@ -83,6 +88,8 @@ def _columns(stored: StoredPoses, site: SiteStore) -> dict[str, list[Any]]:
         "frame": [FRAMES[frame] for frame in poses["frame"].tolist()],
         "relative_pose": _relative(stored.poses),
         **{name: _short(poses[field]).tolist() for name, field in ESTIMATED.items()},
+        "z_source": height_source_values(poses),
+        **floor_columns(site.floors, poses),
         "covariance": covariance_values(_short(poses["cov"])),
         "anchor": list(stored.anchors),
     }
@@ -90,6 +97,9 @@ def _columns(stored: StoredPoses, site: SiteStore) -> dict[str, list[Any]]:
     if origin is not None:
         lat, lon = lat_lon(origin, poses["x"], poses["y"])
         columns["lat"], columns["lon"] = np.round(lat, 9).tolist(), np.round(lon, 9).tolist()
+        alt_m = altitude(origin, poses["z"])
+        if alt_m is not None:
+            columns["alt_m"] = np.round(alt_m, 3).tolist()
     return columns | {"epoch": stored.epochs.tolist()}
 
 

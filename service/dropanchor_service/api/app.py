@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Event
+from typing import TYPE_CHECKING
 
 from fastapi import FastAPI, Request
 from prometheus_client import CollectorRegistry
@@ -19,22 +20,25 @@ from dropanchor_service.api.http.headers import SecurityHeaders, allow_origins
 from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.omlox.feed.socket import Doorkeeper
-from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.omlox.router import add_omlox
+from dropanchor_service.api.routes.below import below
 from dropanchor_service.api.routes.dashboard import page_mounts
-from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.routes.plan_images import MAX_UPLOAD_BYTES
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.api.routes.sites import sites_router
 from dropanchor_service.api.site_routers import SharedParts, ingest_routers, site_routers
-from dropanchor_service.basemap.basemap import ServedBasemap
+from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.phones.intake import Receive
 from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.identity import Authenticator
+from dropanchor_service.store.omlox_items import OmloxItems
+
+if TYPE_CHECKING:
+    from dropanchor_service.basemap.basemap import ServedBasemap  # an extra
 
 PREFIX = "/api/v1"
 ALL_METHODS = ["DELETE", "GET", "HEAD", "PATCH", "POST", "PUT"]
@@ -62,7 +66,7 @@ def create_app(
     events: EventParts | None = None,
     omlox: OmloxItems | None = None,
     plans: PlanStore | None = None,
-    basemap: ServedBasemap | None = None,
+    basemap: "ServedBasemap | None" = None,
 ) -> FastAPI:
     """Return the application with all routes and middleware.
 
@@ -108,14 +112,15 @@ def create_app_of(
     app = _app_without_routes(shared, site_of)
     if dashboard is not None:  # before the interfaces: a page needs many files at once
         app.router.routes.extend([*([] if site_of.only else [OverviewFirst()]), *page_mounts(dashboard)])
-    without_site = site_routers(site_of, shared) if site_of.only else ingest_routers(site_of, shared)
+    of_site = site_routers(site_of, shared)
+    without_site = of_site if site_of.only else ingest_routers(site_of, shared)
     for router in (
         *without_site,
-        sites_router(site_of, site_routers(site_of, shared)),
+        sites_router(site_of, of_site),
         health_router(ready, impaired),
     ):
-        app.include_router(router, prefix=PREFIX)
-    app.include_router(metrics_router(registry))
+        app.router.routes.extend(below(PREFIX, router.routes))
+    app.router.routes.extend(metrics_router(registry).routes)
     if all(one.omlox is not None for one in sites):
         doorkeeper = Doorkeeper(shared.authenticator, shared.rate_limiter)
         add_omlox(app, site_of, doorkeeper, shared.stopping)

@@ -47,7 +47,9 @@ def _retyped(before: Surface, now: Surface) -> Iterator[str]:
 
 def _newly_required(before: Surface, now: Surface) -> Iterator[str]:
     for entry, types in now.items():
-        holder = entry.rpartition(".")[0] if " < " in entry else entry.partition(" ? ")[0]
+        holder = entry.partition(" ? ")[0]
+        if " < " in entry:
+            holder = entry.removesuffix("[]") if entry.endswith("[]") else entry.rpartition(".")[0]
         if is_asked(entry) and entry not in before and OPTIONAL not in types and holder.strip() in before:
             yield f"{entry}: is new and required"
 

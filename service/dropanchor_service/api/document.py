@@ -22,7 +22,7 @@ def openapi_of(app: FastAPI) -> dict[str, Any]:
     """Return the OpenAPI document, built once."""
     if app.openapi_schema is None:
         document = get_openapi(
-            title=app.title, version=app.version, description=_description(), routes=app.routes, tags=_TAGS
+            title=app.title, version=app.version, description=_DESCRIPTION, routes=app.routes, tags=_TAGS
         )
         for model in (
             PoseFeatureCollection,
@@ -36,6 +36,7 @@ def openapi_of(app: FastAPI) -> dict[str, Any]:
         ):  # of no route, or not its only model
             schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
             document["components"]["schemas"] |= schema.pop("$defs", {}) | {model.__name__: schema}
+        document["components"]["schemas"]["Problem"]["description"] = _types_of_problems()
         separate_requests(document)
         _add_access(document)
         _share_refusals(document)
@@ -89,17 +90,20 @@ _TAGS = [
     {"name": "events", "description": "What has happened, as CloudEvents."},
     {"name": "destinations", "description": "Who gets events by webhook, e-mail or MQTT."},
     {"name": "shares", "description": "Links that show the page, read only, until they expire."},
+    {"name": "keys", "description": "API keys for people, programs and phones."},
     {"name": "ingest", "description": "Samples over HTTP, for tags that do not speak Zenoh."},
     {"name": "recordings", "description": "MCAP files with raw samples and poses."},
     {"name": "health", "description": "Health checks for supervisors, and metrics for Prometheus."},
 ]
 
 
-def _description() -> str:
+_DESCRIPTION = """\
+Live positions of a fleet of tags around one UWB anchor. All values are in SI units. The site frame is ENU with x
+pointing east. Times are UTC in nanoseconds. Every error is a problem document (RFC 9457): the schema `Problem`, at the
+end, lists the types."""
+
+
+def _types_of_problems() -> str:
+    """Return the table of the schema `Problem`: before the operations, a page would begin with nothing else."""
     rows = "\n".join(f"| `{kind.type}` | {kind.status} | {kind.title} |" for kind in Kind)
-    return (
-        "Live positions of a fleet of tags around one UWB anchor. All values are in SI units. The site frame is ENU "
-        "with x pointing east. Times are UTC in nanoseconds.\n\n"
-        "Every error is a problem document (RFC 9457) of one of these types:\n\n"
-        f"| type | status | title |\n|---|---|---|\n{rows}\n"
-    )
+    return f"Problem details (RFC 9457).\n\n| type | status | title |\n|---|---|---|\n{rows}\n"

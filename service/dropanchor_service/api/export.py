@@ -2,6 +2,7 @@
 
 import json
 import sys
+from functools import cache
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -15,9 +16,9 @@ from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.app import create_app
 from dropanchor_service.api.http.site_in_path import OMLOX_PREFIX
 from dropanchor_service.api.omlox.document import document_of
-from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.omlox.router import described_routes
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store.omlox_items import OmloxItems
 
 FILE = Path(dropanchor_schemas.__file__).parent / "openapi.json"
 
@@ -37,6 +38,7 @@ def application(omlox: OmloxItems | None = None) -> FastAPI:
     )
 
 
+@cache
 def text() -> str:
     """Return the document as JSON."""
     return json.dumps(application().openapi(), indent=2, ensure_ascii=False) + "\n"

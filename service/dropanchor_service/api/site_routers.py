@@ -2,14 +2,17 @@
 
 from dataclasses import dataclass
 from threading import Event
+from typing import TYPE_CHECKING
 
 from fastapi import APIRouter
 
 from dropanchor_service.api.http.borders import ANY_HOST, Border
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.access import access_router
+from dropanchor_service.api.routes.api_keys import api_keys_router
 from dropanchor_service.api.routes.basemap import basemap_router
 from dropanchor_service.api.routes.connect import connect_router
+from dropanchor_service.api.routes.coverage import coverage_router
 from dropanchor_service.api.routes.destinations import destinations_router
 from dropanchor_service.api.routes.events import events_router
 from dropanchor_service.api.routes.figures import figures_router
@@ -22,6 +25,7 @@ from dropanchor_service.api.routes.ingest_stream import ingest_stream_router
 from dropanchor_service.api.routes.plan_images import plan_images_router
 from dropanchor_service.api.routes.plans import plans_router
 from dropanchor_service.api.routes.poses import poses_router
+from dropanchor_service.api.routes.receiver_networks import receiver_networks_router
 from dropanchor_service.api.routes.recordings import recordings_router
 from dropanchor_service.api.routes.remote_settings import remote_settings_router
 from dropanchor_service.api.routes.shares import shares_router
@@ -34,10 +38,13 @@ from dropanchor_service.api.routes.track_file import track_file_router
 from dropanchor_service.api.routes.tracks import tracks_router
 from dropanchor_service.api.routes.zone_occupancy import zone_occupancy_router
 from dropanchor_service.api.routes.zones import zones_router
-from dropanchor_service.basemap.basemap import ServedBasemap
+from dropanchor_service.security.api_keys import api_keys_of
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.identity import Authenticator
 from dropanchor_service.security.share_links import share_links_of
+
+if TYPE_CHECKING:
+    from dropanchor_service.basemap.basemap import ServedBasemap  # an extra
 
 
 @dataclass(frozen=True)
@@ -56,7 +63,7 @@ class SharedParts:
     authenticator: Authenticator | None = None
     rate_limiter: RateLimiter | None = None
     border: Border = ANY_HOST
-    basemap: ServedBasemap | None = None
+    basemap: "ServedBasemap | None" = None
 
 
 def ingest_routers(site_of: SiteOfRequest, shared: SharedParts) -> tuple[APIRouter, ...]:
@@ -80,6 +87,7 @@ def site_routers(site_of: SiteOfRequest, shared: SharedParts) -> tuple[APIRouter
         track_router(site_of),
         track_file_router(site_of),
         tracks_router(site_of),
+        coverage_router(site_of),
         heat_map_router(site_of),
         history_router(site_of),
         stream_router(site_of, shared.stopping),
@@ -95,5 +103,7 @@ def site_routers(site_of: SiteOfRequest, shared: SharedParts) -> tuple[APIRouter
         zone_occupancy_router(site_of),
         events_router(site_of, shared.stopping),
         destinations_router(site_of),
+        receiver_networks_router(site_of),
         shares_router(site_of, share_links_of(shared.authenticator)),
+        api_keys_router(site_of, api_keys_of(shared.authenticator)),
     )

@@ -1,7 +1,8 @@
 """A PMTiles file (version 3): its description when it is opened, and its tiles.
 
-The package `pmtiles` knows the format. This module adds what a service needs: it does not map the file into memory,
-since a file that gets shorter would then end the process; it limits every size; and it keeps the last directories.
+The package `pmtiles` of the extra `maps` knows the format. This module adds what a service needs: it does not map the
+file into memory, since a file that gets shorter would then end the process; it limits every size; and it keeps the last
+directories.
 Format: https://github.com/protomaps/PMTiles/blob/main/spec/v3/spec.md
 """
 
@@ -29,6 +30,7 @@ from pmtiles.tile import (
 )
 
 from dropanchor_schemas.basemap import TileMediaType
+from dropanchor_service.basemap.errors import UnreadableTileError, UnusableFileError
 
 MAX_TILE_BYTES = 4 * 2**20
 MAX_METADATA_BYTES = 8 * 2**20
@@ -47,14 +49,6 @@ _MEDIA_TYPES: dict[TileType, TileMediaType] = {
     TileType.AVIF: "image/avif",
     TileType.MVT: "application/vnd.mapbox-vector-tile",
 }
-
-
-class UnusableFileError(ValueError):
-    """The file cannot be a base map. The message says why."""
-
-
-class UnreadableTileError(Exception):
-    """A tile is damaged, too large, or cannot be read now. The message says which."""
 
 
 class TileFile:

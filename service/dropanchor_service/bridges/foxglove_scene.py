@@ -104,7 +104,7 @@ def location_fixes(poses: Iterable[Json]) -> LocationFixes:
             frame_id=tag_frame_id(pose["tag"]),
             latitude=pose["lat"],
             longitude=pose["lon"],
-            altitude=math.nan,  # not estimated
+            altitude=math.nan if pose.get("alt_m") is None else pose["alt_m"],
             color=_colour(pose["state"], 1.0),
         )
         for pose in poses

@@ -11,16 +11,16 @@ import numpy as np
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
-from dropanchor_schemas.wire import ImuSample, RangeSample, anchor_number
+from dropanchor_schemas.wire import ImuSample, PressureSample, RangeSample, anchor_number
 from dropanchor_service.bridges.frames import SITE
 from dropanchor_service.bridges.rmw_zenoh import NO_TYPE_HASH, RosType
 
 Json = Mapping[str, Any]
 
-UNKNOWN_VARIANCE = 1e6  # of z, roll and pitch, which are not estimated, and of the twist
+UNKNOWN_VARIANCE = 1e6  # of roll and pitch, which are not estimated, of a z that was not measured, and of the twist
 USABLE_STATES = ("tracking", "coasting", "degraded")
 TWIST_COVARIANCE = np.diag([UNKNOWN_VARIANCE] * 6).reshape(-1)
-_X, _Y, _YAW = 0, 1, 5  # rows of the 6 × 6 covariances of ROS
+_X, _Y, _Z, _YAW = 0, 1, 2, 5  # rows of the 6 × 6 covariances of ROS
 
 
 class UnusableError(ValueError):
@@ -35,6 +35,7 @@ class RosMessages:
         self._humble = get_typestore(Stores.ROS2_HUMBLE)
         self.imu = self._type("sensor_msgs/msg/Imu")
         self.range = self._type("sensor_msgs/msg/Range")
+        self.pressure = self._type("sensor_msgs/msg/FluidPressure")
         self.pose = self._type("geometry_msgs/msg/PoseWithCovarianceStamped")
         self.odometry = self._type("nav_msgs/msg/Odometry")
         self.tf = self._type("tf2_msgs/msg/TFMessage")
@@ -63,6 +64,13 @@ class RosMessages:
         variance = getattr(message, "variance", 0.0)  # Humble has none
         std_m = math.sqrt(variance) if variance > 0 else math.nan
         return RangeSample(_time_ns(message, t_ns), anchor_number(anchor), message.range, std_m)
+
+    def pressure_sample(self, cdr: bytes, t_ns: int, type_hash: str) -> PressureSample:
+        """Return the sample of a sensor_msgs/FluidPressure. t_ns: its time if it has no stamp. Raises UnusableError."""
+        message = self._read(cdr, self.pressure, type_hash)
+        if not math.isfinite(message.fluid_pressure):
+            raise UnusableError("a pressure that is not finite")
+        return PressureSample(_time_ns(message, t_ns), message.fluid_pressure)
 
     def pose_cdr(self, pose: Json, height_m: float) -> bytes:
         """Return the geometry_msgs/PoseWithCovarianceStamped of a usable pose (JSON of `Pose`)."""
@@ -100,6 +108,8 @@ class RosMessages:
         placed = self._make("geometry_msgs/msg/Pose", position=point, orientation=self._rotation(pose))
         covariance = np.diag([0.0, 0.0, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE, 0.0])
         covariance[np.ix_([_X, _Y, _YAW], [_X, _Y, _YAW])] = pose["covariance"]
+        if pose.get("z_source") == "pressure":
+            covariance[_Z, _Z] = pose["z_std_m"] ** 2
         return self._make("geometry_msgs/msg/PoseWithCovariance", pose=placed, covariance=covariance.reshape(-1))
 
     def _rotation(self, pose: Json) -> Any:

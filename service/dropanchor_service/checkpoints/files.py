@@ -3,13 +3,14 @@
 from contextlib import suppress
 from pathlib import Path
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.checkpoints.format import CheckpointError, Decode, Snapshot, UnreadableLayoutError, encoded
 from dropanchor_service.runtime.atomic_file import write_atomically
-from dropanchor_service.runtime.recovery import Recovery
+from dropanchor_service.runtime.recovery import DAMAGED, Recovery
 
 KEPT = 2
 _PREFIX = "checkpoint-"
-INSTEAD = "the one before is used, or else all tags start afresh"
+INSTEAD = say("checkpoint_before", "the one before is used, or else all tags start afresh")
 _ASIDE = f"unread-{_PREFIX}"
 
 
@@ -48,7 +49,7 @@ class CheckpointFolder:
                 complaints.append(f"{path.name} is not used: {error}; {_put_aside(path)}")
             except (OSError, CheckpointError) as error:
                 complaints.append(f"{path.name} is not used: {error}")
-                self._recovery.set_aside(path, "is damaged", INSTEAD, f"{_PREFIX}*")
+                self._recovery.set_aside(path, DAMAGED, INSTEAD, f"{_PREFIX}*")
         return None, complaints
 
     def _files(self, prefix: str = _PREFIX) -> list[Path]:

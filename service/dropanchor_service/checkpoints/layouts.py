@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 
-VERSION = 6
+from dropanchor_schemas.sentences import say
+
+VERSION = 7
 """Number of the layout that this version writes. Raise it when a column of the state changes, in its name, its type or
 its meaning: `migrations.py` says what else to do."""
 READ_BEFORE = 2
@@ -45,10 +47,16 @@ def why_unreadable(layout: str, own: str) -> str | None:
     if version is not None and oldest <= version < VERSION:
         return None
     if version is not None and version > VERSION:
-        return f"{layout}, but this version uses {own}, which is older"
+        return say("layout_later", "{theirs}, but this version uses {ours}, which is older", theirs=layout, ours=own)
     if version is not None and version < oldest:
-        return f"{layout}, but this version uses {own} and reads none before {oldest}"
-    return f"{layout}, but this version uses {own}"
+        return say(
+            "layout_too_early",
+            "{theirs}, but this version uses {ours} and reads none before {oldest}",
+            theirs=layout,
+            ours=own,
+            oldest=oldest,
+        )
+    return say("layout_differs", "{theirs}, but this version uses {ours}", theirs=layout, ours=own)
 
 
 def may_be_read(layout: str) -> bool:

@@ -26,19 +26,27 @@ Steps = Mapping[int, Callable[[Snapshot], Snapshot]]
 SETTINGS = "engine.settings"
 
 
-def with_more_reasons(found: Snapshot) -> Snapshot:
-    """Return a snapshot whose counters have room for the reasons of rejections that layout 6 appended."""
+def with_more_counters(found: Snapshot) -> Snapshot:
+    """Return a snapshot whose counters have room for the kinds of samples and the reasons that a layout appended.
+
+    In `screened` the messages stand behind the kinds.
+    """
     before = found.arrays.get("counts")
     if before is None or "rejected" not in (before.dtype.names or ()):
         return found
     after = np.zeros(len(before), COUNTS)
-    for name in set(before.dtype.names or ()) - {"rejected"}:
-        after[name] = before[name]
-    after["rejected"][:, : before["rejected"].shape[1]] = before["rejected"]
+    for name in before.dtype.names or ():
+        if before[name].ndim == 1:
+            after[name] = before[name]
+            continue
+        known = before[name].shape[1] - (name == "screened")
+        after[name][:, :known] = before[name][:, :known]
+        if name == "screened":
+            after[name][:, -1] = before[name][:, -1]
     return Snapshot({**found.arrays, "counts": after}, found.document)
 
 
-STEPS: Steps = {5: with_more_reasons}
+STEPS: Steps = {5: with_more_counters, 6: with_more_counters}
 
 
 def migrated(found: Snapshot, version: int, dtypes: DTypes, fresh: Fresh, steps: Steps = STEPS) -> Snapshot:

@@ -4,6 +4,7 @@ import logging
 import time
 from collections.abc import Callable
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.cluster import leases
 from dropanchor_service.cluster.boot_clock import boot_s
 from dropanchor_service.cluster.database import Connection, DatabaseError, make_tables, sentence_of
@@ -31,7 +32,7 @@ class Standby:
         self._layout = layout
         self._watch = Watch(who.lease_s, who.name)
         self._noted_s = 0.0
-        self.sentence = "The service is starting."
+        self.sentence: str = say("starting", "The service is starting.")
 
     def wait(self, on_look: Callable[[], None]) -> Claimed:
         """Return what was claimed. on_look: called about once a second."""

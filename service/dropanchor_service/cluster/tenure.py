@@ -4,6 +4,8 @@ from collections.abc import Callable
 from enum import Enum
 from threading import Lock
 
+from dropanchor_schemas.sentences import say
+
 HAND_OVER_S = 10.0  # that a successor has before the former owner leaves
 GIVE_UP_S = 10.0  # in doubt: then the process ends, and its restart begins as a standby
 FROZEN = 0.5  # of the lease: a longer pause between two ticks means that this process did not run
@@ -88,10 +90,10 @@ class Tenure:
     def _judge(self) -> Standing:
         now_s = self._now_s()
         if not self.why_lost and self._leaves_s is not None and now_s > self._leaves_s:
-            self.why_lost = f"it was handed over {HAND_OVER_S:.0f} s ago"
+            self.why_lost = say("handed_over", "it was handed over {seconds} s ago", seconds=f"{HAND_OVER_S:.0f}")
         has_lease = self._leaves_s is None and now_s - self._renewed_s <= self._lease_s
         if not self.why_lost and not has_lease and self._highest > self.epoch:
-            self.why_lost = f"an owner with the higher epoch {self._highest} is alive"
+            self.why_lost = say("higher_epoch", "an owner with the higher epoch {epoch} is alive", epoch=self._highest)
         if self.why_lost:
             return Standing.LOST
         if self._leaves_s is not None:
@@ -103,6 +105,10 @@ class Tenure:
         if self._in_doubt_since_s is None:
             return Standing.ALONE if self._hears_others() else Standing.IN_DOUBT
         if now_s - self._in_doubt_since_s > GIVE_UP_S:
-            self.why_lost = f"this process did not run for a while, and the database has not answered for {GIVE_UP_S} s"
+            self.why_lost = say(
+                "gave_up",
+                "this process did not run for a while, and the database has not answered for {seconds} s",
+                seconds=GIVE_UP_S,
+            )
             return Standing.LOST
         return Standing.IN_DOUBT

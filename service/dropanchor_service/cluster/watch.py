@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.checkpoints import layouts
 
 
@@ -83,6 +84,8 @@ def obstacle(lease: Lease, sites: str, layout: str) -> str | None:
     if lease.takes_any:
         return None
     if lease.sites not in ("", sites):
-        return "its settings of sites and tags are not those of the owner"
+        return say("other_sites", "its settings of sites and tags are not those of the owner")
     why_unreadable = layouts.why_unreadable(lease.layout, layout) if lease.layout else None
-    return None if why_unreadable is None else f"the checkpoint has the layout {why_unreadable}"
+    if why_unreadable is None:
+        return None
+    return say("other_layout", "the checkpoint has the layout {why}", why=why_unreadable)

@@ -3,11 +3,9 @@
 import argparse
 
 from dropanchor_service.commands.options import add_log_option
-from dropanchor_service.engines.choose import create_engine
+from dropanchor_service.engines.compile_all import compile_all
 from dropanchor_service.engines.compile_apart import mark_complete
-from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_ingest, warm_up_zones
 from dropanchor_service.runtime import logs
-from dropanchor_service.settings.model import Settings
 
 DESCRIPTION = """\
 Compiles the estimator and caches the result, so that the first start of `dropanchor serve` is as fast as any other.
@@ -28,9 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     logs.configure(arguments.log_level)
-    create_engine(Settings(engine="fleet"))
-    warm_up_ingest()
-    warm_up_answers()
-    warm_up_zones()
+    compile_all()
     mark_complete()
     return 0

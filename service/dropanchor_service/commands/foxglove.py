@@ -169,6 +169,7 @@ class LiveScene:
         anchors = self._anchors if full else ()
         if not poses and not anchors:
             return
+        self._heights |= {pose["tag"]: pose["z"] for pose in poses if pose.get("z") is not None}
         self._scene.log(scene(poses, anchors, self._heights, t_ns), log_time=t_ns)
         self._tf.log(transforms(poses, anchors, self._heights, t_ns), log_time=t_ns)
         if any(pose.get("lat") is not None for pose in poses):

@@ -11,7 +11,7 @@ from dropanchor_service.commands.history_move import HistoryFile, Moved, move, s
 from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.postgresql.database import Database
 from dropanchor_service.history.storage import Retention
-from dropanchor_service.persistence import open_database, retention_of
+from dropanchor_service.persistence.site import open_database, retention_of
 from dropanchor_service.settings.sources import SettingsError, load_settings
 
 DESCRIPTION = """\

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dropanchor_schemas.site import Anchor, StartPose, TagSettings
-from dropanchor_service.evaluation.plaza import FILES, PLAZA_SCALE, PLAZA_STD, read_plaza
+from dropanchor_service.offline.plaza import FILES, PLAZA_SCALE, PLAZA_STD, read_plaza
 from dropanchor_service.settings.model import Settings
 from dropanchor_tag_client.recording import Recording, RecordingError, read_recording
 

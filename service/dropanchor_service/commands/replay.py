@@ -2,8 +2,9 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib import import_module
+from typing import Any
 
 from pydantic import ValidationError
 from tqdm import tqdm
@@ -11,13 +12,13 @@ from tqdm import tqdm
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.commands.replay_mcap import replay_files
 from dropanchor_service.commands.replay_options import COLUMNS, DESCRIPTION, EPILOG, add_arguments
-from dropanchor_service.commands.replay_output import check, opened, values_of
+from dropanchor_service.commands.replay_output import SOURCE, check, opened, values_of
 from dropanchor_service.commands.replay_report import no_usable_range, report, score_of
 from dropanchor_service.commands.replay_source import mcap_files_of
 from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.estimation.columns import Array, Engine
-from dropanchor_service.evaluation.prepared import prepared, with_units
-from dropanchor_service.evaluation.replay import (
+from dropanchor_service.offline.prepared import prepared, with_units
+from dropanchor_service.offline.replay import (
     NS_PER_S,
     Samples,
     Track,
@@ -28,7 +29,7 @@ from dropanchor_service.evaluation.replay import (
     track_of,
     truth_of,
 )
-from dropanchor_service.evaluation.sensors import CheckedEngine, known_from_start
+from dropanchor_service.offline.sensors import CheckedEngine, known_from_start
 from dropanchor_service.settings.engine_columns import tag_columns
 from dropanchor_service.settings.sources import SettingsError, load_settings
 from dropanchor_tag_client.recording import Recording, RecordingError, read_recording
@@ -39,7 +40,7 @@ __all__ = ["COLUMNS", "DESCRIPTION", "EPILOG", "add_arguments", "run"]
 def run(arguments: argparse.Namespace) -> int:
     """Run the replay. Return 0 on success, 2 if the recording or the options are unusable, 130 on Ctrl-C."""
     if arguments.plot:
-        import_module("dropanchor_service.evaluation.track_plot")  # fails early if matplotlib is missing
+        import_module("dropanchor_service.offline.track_plot")  # fails early if matplotlib is missing
     try:
         if arguments.out:
             check(arguments.out)
@@ -137,21 +138,29 @@ def _conclude(
     arguments: argparse.Namespace, recording: Recording, anchors: Sequence[str], samples: Samples, track: Track
 ) -> int:
     if arguments.out:
-        with opened(arguments.out, COLUMNS) as write:
-            write([t, *values] for t, values in zip(track.t.tolist(), values_of(track.poses), strict=True))
+        with opened(arguments.out, COLUMNS if track.smoothed is None else (*COLUMNS, SOURCE)) as write:
+            write([t, *values] for t, values in zip(track.t.tolist(), _values(track), strict=True))
         print(f"{len(track.poses)} poses: {arguments.out}")
     first = recording.anchor(anchors[0])
     score = score_of(track, truth_of(recording), (first.x, first.y))
     for line in report(track, score, samples, start_is_given=arguments.start is not None):
         print(line)
     if arguments.plot:
-        from dropanchor_service.evaluation.track_plot import plot_track
+        from dropanchor_service.offline.track_plot import plot_track
 
         title = f"{recording.name}, anchor {', '.join(anchors)}{score.title()}"
         used = anchors_of(recording)[[recording.anchors.index(recording.anchor(anchor)) for anchor in anchors]]
         plot_track(arguments.plot, title, track.t, track.poses, truth_of(recording), used)
         print(f"picture: {arguments.plot}")
     return 0
+
+
+def _values(track: Track) -> Iterator[list[Any]]:
+    """Yield VALUES of each pose, with its source if the track was smoothed."""
+    values = values_of(track.poses)
+    if track.smoothed is None:
+        return values
+    return ([*one, "smoothed" if later else "filtered"] for one, later in zip(values, track.smoothed, strict=True))
 
 
 def _only_anchor(recording: Recording) -> list[str]:

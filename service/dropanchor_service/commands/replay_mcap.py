@@ -18,7 +18,7 @@ from dropanchor_schemas.wire import Reason
 from dropanchor_service.answers.frames import FRAMES, STATES, published_states
 from dropanchor_service.commands.replay_output import VALUES, Write, opened, values_of
 from dropanchor_service.estimation.columns import Array, Frame
-from dropanchor_service.evaluation.offline import OfflineService, settings_of
+from dropanchor_service.offline.recorded_turns import OfflineService, settings_of
 from dropanchor_service.recording.mcap_file import SESSION
 from dropanchor_service.recording.reading import RecordingReader, Turn
 from dropanchor_service.settings.sources import load_settings

@@ -37,6 +37,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ID",
         help="use the ranges of this anchor; may be repeated; needed if the recording has several anchors",
     )
+    _add_estimator(parser)
+    _add_tag_settings(parser)
+    _add_smoothing(parser)
+    add(
+        "--clock-offset",
+        type=_seconds,
+        metavar="S",
+        help="the IMU's clock is so far ahead of the ranges'; 0: not at all (default: found from turns and stops)",
+    )
+    add("--config", type=Path, metavar="FILE", help="settings file of the service, for the engine's parameters")
+    _add_output(parser)
+
+
+def _add_estimator(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
     add("--engine", metavar="NAME", help="estimator: fleet (default) or paper")
     add(
         "--start",
@@ -50,16 +65,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="source of the heading: the IMU, or heading.csv (default: auto, the IMU if the recording has one)",
     )
-    _add_tag_settings(parser)
-    _add_smoothing(parser)
-    add(
-        "--clock-offset",
-        type=_seconds,
-        metavar="S",
-        help="the IMU's clock is so far ahead of the ranges'; 0: not at all (default: found from turns and stops)",
-    )
-    add("--config", type=Path, metavar="FILE", help="settings file of the service, for the engine's parameters")
-    _add_output(parser)
 
 
 def _add_output(parser: argparse.ArgumentParser) -> None:

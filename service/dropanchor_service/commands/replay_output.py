@@ -17,7 +17,8 @@ from dropanchor_service.settings.sources import SettingsError
 Write = Callable[[Iterable[Sequence[Any]]], None]
 VALUES = ("x", "y", "heading_rad", "speed_mps", "var_x", "cov_xy", "var_y", "p_mode", "state", "frame")
 FORMATS = (".csv", ".csv.gz", ".jsonl", ".jsonl.gz", ".parquet")
-_WHOLE, _TEXTS = ("t_ns",), ("tag", "state", "frame")
+SOURCE = "source"  # of a pose of a smoothed track: smoothed or filtered
+_WHOLE, _TEXTS = ("t_ns",), ("tag", "state", "frame", SOURCE)
 
 
 def values_of(poses: Array) -> Iterator[list[Any]]:

@@ -6,8 +6,8 @@ from math import isnan
 
 from dropanchor_service.answers.frames import STATES, published_states
 from dropanchor_service.estimation.columns import Array, Frame
-from dropanchor_service.evaluation.accuracy import Accuracy, Truth, accuracy, share_of_time
-from dropanchor_service.evaluation.replay import Samples, Track
+from dropanchor_service.offline.accuracy import Accuracy, Truth, accuracy, share_of_time
+from dropanchor_service.offline.replay import Samples, Track
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,8 @@ def report(track: Track, score: Score, samples: Samples, start_is_given: bool) -
             "poses in a frame of the tag's own: its angle to the site's frame is not known"
         )
     shares = share_of_time(track.t, published_states(track.poses["state"], track.poses["frame"]), STATES)
+    if track.smoothed is not None and len(track.smoothed):
+        yield f"smoothed: {track.smoothed.mean():.1%} of the poses; the others are as filtered"
     yield "time: " + ", ".join(f"{name} {share:.1%}" for name, share in shares.items())
     if samples.rejected:
         yield "not used: " + rejections(samples)

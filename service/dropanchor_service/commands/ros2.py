@@ -71,6 +71,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=os.environ.get(DOMAIN_VARIABLE) or "0",
         help=f"ROS domain (default: {DOMAIN_VARIABLE}, or 0)",
     )
+    _add_sensors(ros)
+    ros.add_argument("--namespace", type=_topic, default="dropanchor", help="of the published topics (%(default)s)")
+    ros.add_argument("--child-frame", metavar="FRAME", help="frame that moves with the tag (default: tag/TAG)")
+    ros.add_argument("--no-tf", action="store_true", help="do not publish TF: something else does")
+    ros.add_argument("--max-hz", type=positive, default=20, metavar="HZ", help="poses per second (default: 20)")
+    add("--url", default="http://127.0.0.1:8080", help="URL of the service, for poses (default: %(default)s)")
+    add_connection_options(parser)
+
+
+def _add_sensors(ros: argparse._ArgumentGroup) -> None:
     ros.add_argument("--imu", type=_topic, metavar="TOPIC", help="read sensor_msgs/Imu from this topic")
     ros.add_argument("--forward", choices=AXES, default="x", help="axis of the IMU that points forward (default: x)")
     ros.add_argument("--up", choices=AXES, default="z", help="axis of the IMU that points up (default: z)")
@@ -82,12 +92,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="TOPIC=ANCHOR",
         help="read sensor_msgs/Range to this anchor from this topic; may be repeated",
     )
-    ros.add_argument("--namespace", type=_topic, default="dropanchor", help="of the published topics (%(default)s)")
-    ros.add_argument("--child-frame", metavar="FRAME", help="frame that moves with the tag (default: tag/TAG)")
-    ros.add_argument("--no-tf", action="store_true", help="do not publish TF: something else does")
-    ros.add_argument("--max-hz", type=positive, default=20, metavar="HZ", help="poses per second (default: 20)")
-    add("--url", default="http://127.0.0.1:8080", help="URL of the service, for poses (default: %(default)s)")
-    add_connection_options(parser)
+    ros.add_argument("--pressure", type=_topic, metavar="TOPIC", help="read sensor_msgs/FluidPressure from this topic")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -100,7 +105,7 @@ def run(arguments: argparse.Namespace) -> int:
         _say(f"connecting to the router of the ROS nodes at {arguments.ros_connect} (--ros-connect)")
         with ExitStack() as stack:
             node = RosNode(stack.enter_context(opened_session(_ros_options(arguments))), arguments.domain, _NODE)
-            reads = arguments.imu or arguments.range
+            reads = arguments.imu or arguments.range or arguments.pressure
             client = stack.enter_context(opened_client(arguments, arguments.tag)) if reads else None
             _bridge(arguments, node, client, mounted)
     except (ConnectError, ValueError, OSError) as error:
@@ -192,11 +197,12 @@ class PoseOutput:
             _say(text)
 
     def _publish(self, pose: Json) -> None:
-        self._pose(self._messages.pose_cdr(pose, self._height_m))
+        height_m = self._height_m if pose.get("z") is None else pose["z"]
+        self._pose(self._messages.pose_cdr(pose, height_m))
         if pose["speed_mps"] is not None and pose["yaw_rate_radps"] is not None:
-            self._odometry(self._messages.odometry_cdr(pose, self._height_m, self._child_frame))
+            self._odometry(self._messages.odometry_cdr(pose, height_m, self._child_frame))
         if self._tf is not None:
-            self._tf(self._messages.tf_cdr(pose, self._height_m, self._child_frame))
+            self._tf(self._messages.tf_cdr(pose, height_m, self._child_frame))
 
 
 def _topic(text: str) -> str:

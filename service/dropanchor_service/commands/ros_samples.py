@@ -42,16 +42,24 @@ class SampleInput:
         self._told: Counter[str] = Counter()
         self._tell_s = 0.0
         self._is_humble = False
-        wanted = {}
+        wanted = self._subscribed(arguments)
+        self._silence = SilenceWatch(
+            wanted, arguments.domain, arguments.ros_connect, node.publishers_of_others, time.monotonic()
+        )
+
+    def _subscribed(self, arguments: argparse.Namespace) -> dict[str, str]:
+        """Subscribe to the topics that were asked for. Return the type of each."""
+        node, messages, wanted = self._node, self._messages, {}
         if arguments.imu:
             node.subscribe(arguments.imu, messages.imu, self._imu)
             wanted[arguments.imu] = messages.imu.name
         for topic, anchor in arguments.range:
             node.subscribe(topic, messages.range, partial(self._range, anchor))
             wanted[topic] = messages.range.name
-        self._silence = SilenceWatch(
-            wanted, arguments.domain, arguments.ros_connect, node.publishers_of_others, time.monotonic()
-        )
+        if arguments.pressure:
+            node.subscribe(arguments.pressure, messages.pressure, self._pressure)
+            wanted[arguments.pressure] = messages.pressure.name
+        return wanted
 
     def take(self) -> None:
         """Publish the sample of the next message, if one comes soon. Say now and then what was left out or lacks."""
@@ -94,3 +102,7 @@ class SampleInput:
     def _range(self, anchor: str, received: Received) -> None:
         sample = self._messages.range_sample(received.cdr, received.t_ns, anchor, received.type_hash)
         self._client.publish_range(anchor, sample.range_m, t_ns=sample.t_ns, std_m=sample.std_m)
+
+    def _pressure(self, received: Received) -> None:
+        sample = self._messages.pressure_sample(received.cdr, received.t_ns, received.type_hash)
+        self._client.publish_pressure(sample.pressure_pa, t_ns=sample.t_ns)

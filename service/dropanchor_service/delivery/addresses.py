@@ -10,7 +10,9 @@ import socket
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from dropanchor_service.delivery.public_addresses import Network, address_of, is_public
+from dropanchor_schemas.sentences import said_by, say
+from dropanchor_service.delivery.public_addresses import Address, Network, address_of, is_public
+from dropanchor_service.delivery.receiver_networks import network_around
 
 if TYPE_CHECKING:
     import httpx
@@ -21,7 +23,9 @@ class UrlError(ValueError):
 
 
 class RefusedAddressError(UrlError):
-    """The receiver has an address that the settings do not allow."""
+    """The receiver has an address that is not allowed. network: the one that the page can allow; None: it cannot."""
+
+    network: Network | None = None
 
 
 def checked_url(url: str) -> "httpx.URL":
@@ -32,11 +36,15 @@ def checked_url(url: str) -> "httpx.URL":
         parsed = httpx.URL(url)
         host = parsed.host
     except (httpx.InvalidURL, UnicodeError) as error:
-        raise UrlError(f"the URL cannot be read: {error}") from error
+        raise UrlError(say("url_unreadable", "the URL cannot be read: {why}", why=said_by(error))) from error
     if parsed.scheme not in ("http", "https") or not host:
-        raise UrlError("the URL must begin with https:// or http:// and name a host")
+        raise UrlError(say("url_scheme", "the URL must begin with https:// or http:// and name a host"))
     if parsed.userinfo:
-        raise UrlError("the URL must not hold a name or password: the receiver can check the signature instead")
+        raise UrlError(
+            say(
+                "url_password", "the URL must not hold a name or password: the receiver can check the signature instead"
+            )
+        )
     return parsed
 
 
@@ -53,11 +61,44 @@ def allowed(addresses: Sequence[str], networks: Iterable[Network]) -> str:
     for text in addresses:
         address = address_of(text)
         if not is_public(address) and not any(address in network for network in listed):
-            raise RefusedAddressError(
-                f"the receiver has the address {address}, which is not public: an administrator can allow it with "
-                "`allow_networks` in `[delivery]` of the settings"
-            )
+            raise _refusal(address)
     return addresses[0]
+
+
+def _refusal(address: Address) -> RefusedAddressError:
+    """Return why a receiver is refused, and the nearest way to mend that."""
+    network = network_around(address)
+    if network is not None:
+        refused = RefusedAddressError(
+            say(
+                "private_address",
+                "the receiver has the address {address}, which is not public: an administrator can allow "
+                "{network} on the page (webhooks and mail servers), or with `allow_networks` in "
+                "`[delivery]` of the settings",
+                address=address,
+                network=network,
+            )
+        )
+        refused.network = network
+        return refused
+    if address.is_loopback:
+        return RefusedAddressError(
+            say(
+                "own_address",
+                "the receiver has the address {address}, which is the machine of the service itself: give "
+                "the address that this machine has in your network, or allow it with `allow_networks` in "
+                "`[delivery]` of the settings",
+                address=address,
+            )
+        )
+    return RefusedAddressError(
+        say(
+            "other_address",
+            "the receiver has the address {address}, which only the settings can allow: "
+            "`allow_networks` in `[delivery]`",
+            address=address,
+        )
+    )
 
 
 def is_told(server: str) -> bool:

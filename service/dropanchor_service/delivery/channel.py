@@ -6,9 +6,18 @@ from enum import Enum
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from dropanchor_schemas.sentences import said_by, say
+
 
 class ChannelError(ValueError):
-    """Nothing can be delivered to this destination. The message says what to do."""
+    """Nothing can be delivered to this destination. The message says what to do.
+
+    network: the network that the page can allow, after which something can; None: that is not what is wrong.
+    """
+
+    def __init__(self, message: str, network: str | None = None) -> None:
+        super().__init__(message)
+        self.network = network
 
 
 class Verdict(Enum):
@@ -64,4 +73,6 @@ def password_in(file: Path) -> str:
     try:
         return file.read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
-        raise ChannelError(f"the password file {file} cannot be read: {error}") from error
+        raise ChannelError(
+            say("password_file", "the password file {file} cannot be read: {why}", file=file, why=said_by(error))
+        ) from error

@@ -2,14 +2,17 @@
 
 import importlib
 import ssl
+from collections.abc import Mapping
 from contextlib import AbstractAsyncContextManager
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dropanchor_schemas.destinations import Destination, EmailDestination, MqttDestination, WebhookDestination
-from dropanchor_service.delivery.addresses import UrlError, allowed, checked_url, resolved
+from dropanchor_schemas.sentences import said_by, say, with_stop
+from dropanchor_service.delivery.addresses import RefusedAddressError, UrlError, allowed, checked_url, resolved
 from dropanchor_service.delivery.channel import Channel, ChannelError, tls_context
+from dropanchor_service.delivery.receiver_networks import ReceiverNetworks
 from dropanchor_service.delivery.sentences import NameOf
 from dropanchor_service.delivery.signature import SecretError, key_of
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
@@ -60,8 +63,13 @@ class Channels:
         mqtt: MqttSettings,
         name_of: NameOf = str,
         shared: SharedWays | None = None,
+        networks: ReceiverNetworks | None = None,
     ) -> None:
-        """name_of: by default, the id of the tag. shared: by all sites. Raises OSError; see `SharedWays`."""
+        """name_of: by default, the id of the tag. shared: by all sites. networks: by default, those of the settings.
+
+        Raises OSError; see `SharedWays`.
+        """
+        self.networks = networks or ReceiverNetworks(delivery.allow_networks)
         self._delivery = delivery
         self._email = email
         self._mqtt = mqtt
@@ -75,12 +83,12 @@ class Channels:
             case WebhookDestination():
                 from dropanchor_service.delivery.webhook import open_webhook  # these libraries take memory
 
-                return open_webhook(destination, self._shared.webhook, timeout_s, self._delivery.allow_networks)
+                return open_webhook(destination, self._shared.webhook, timeout_s, self.networks)
             case EmailDestination():
                 from dropanchor_service.delivery.mail import open_mail
 
-                page, networks = self._delivery.page, self._delivery.allow_networks
-                return open_mail(destination, self._email, self._shared.email, timeout_s, networks, page, self._name_of)
+                page, tls = self._delivery.page, self._shared.email
+                return open_mail(destination, self._email, tls, timeout_s, self.networks, page, self._name_of)
             case MqttDestination():
                 from dropanchor_service.delivery.mqtt import open_mqtt  # an extra
 
@@ -95,23 +103,41 @@ class Channels:
 
     def check_settings(self, destination: Destination) -> None:
         """Raise ChannelError when the settings lack what the type of the destination needs."""
-        match destination:
-            case EmailDestination() if self._email.server is None:
-                raise ChannelError("an e-mail needs a mail server: set `server` in `[email]` of the settings")
-            case MqttDestination() if self._mqtt.server is None:
-                raise ChannelError("MQTT needs a broker: set `server` in `[mqtt]` of the settings")
-            case MqttDestination() if not _is_installed("paho.mqtt"):
-                raise ChannelError("MQTT needs the extra `mqtt`: pip install 'dropanchor-service[mqtt]'")
+        self._check_type(destination.type)
+
+    def unavailable(self) -> Mapping[str, str]:
+        """Return the types for which the settings lack something, each with what to do."""
+        found = {}
+        for kind in ("email", "mqtt"):
+            try:
+                self._check_type(kind)
+            except ChannelError as error:
+                found[kind] = with_stop(said_by(error))
+        return found
+
+    def _check_type(self, kind: str) -> None:
+        if kind == "email" and self._email.server is None:
+            raise ChannelError(
+                say("no_mail_server", "an e-mail needs a mail server: set `server` in `[email]` of the settings")
+            )
+        if kind == "mqtt" and self._mqtt.server is None:
+            raise ChannelError(say("no_broker", "MQTT needs a broker: set `server` in `[mqtt]` of the settings"))
+        if kind == "mqtt" and not _is_installed("paho.mqtt"):
+            raise ChannelError(say("no_mqtt", "MQTT needs the extra `mqtt`: pip install 'dropanchor-service[mqtt]'"))
 
     def _check_webhook(self, webhook: WebhookDestination) -> None:
         if webhook.secret is None:
-            raise ChannelError("a new webhook needs a secret, with which the receiver can check the signature")
+            raise ChannelError(
+                say("no_secret", "a new webhook needs a secret, with which the receiver can check the signature")
+            )
         try:
             key_of(webhook.secret)
             url = checked_url(webhook.url)
-            allowed(resolved(url), self._delivery.allow_networks)
+            allowed(resolved(url), self.networks)
+        except RefusedAddressError as error:
+            raise ChannelError(said_by(error), None if error.network is None else str(error.network)) from error
         except (SecretError, UrlError) as error:
-            raise ChannelError(str(error)) from error
+            raise ChannelError(said_by(error)) from error
         except OSError:
             pass  # the name may exist later; until then the queue says what is wrong
 

@@ -2,10 +2,11 @@
 
 import asyncio
 import hashlib
+import socket
 import ssl
 from collections import Counter
-from collections.abc import AsyncIterator, Sequence
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Iterable, Sequence
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from email.message import EmailMessage
 from email.utils import formatdate
@@ -25,6 +26,7 @@ MAX_EVENTS = 10_000  # in one mail, which is then about 1 MB
 LINKED = 20  # events in a mail that get a link each
 _PORTS = {"starttls": 587, "tls": 465, "none": 25}
 _PERMANENT = 500
+_END_S = 1.0  # until asyncio has closed a connection that has ended
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ class MailChannel:
     settings: EmailSettings
     tls: ssl.SSLContext
     timeout_s: float
-    allow_networks: Sequence[Network]
+    allow_networks: Iterable[Network]
     page: str | None
     name_of: NameOf
 
@@ -68,17 +70,20 @@ class MailChannel:
         port = self.settings.port or _PORTS[self.settings.tls]
         async with asyncio.timeout(self.timeout_s):
             sock = await connected(server, port, self.allow_networks)
-        return await aiosmtplib.send(
-            mail,
-            hostname=server,
-            sock=sock,
-            username=self.settings.user,
-            password=None if file is None else password_in(file),
-            timeout=self.timeout_s,
-            use_tls=self.settings.tls == "tls",
-            start_tls=self.settings.tls == "starttls",
-            tls_context=None if self.settings.tls == "none" else self.tls,
-        )
+        try:
+            return await aiosmtplib.send(
+                mail,
+                hostname=server,
+                sock=sock,
+                username=self.settings.user,
+                password=None if file is None else password_in(file),
+                timeout=self.timeout_s,
+                use_tls=self.settings.tls == "tls",
+                start_tls=self.settings.tls == "starttls",
+                tls_context=None if self.settings.tls == "none" else self.tls,
+            )
+        finally:
+            await _end(sock)
 
 
 @asynccontextmanager
@@ -87,12 +92,23 @@ async def open_mail(
     settings: EmailSettings,
     tls: ssl.SSLContext,
     timeout_s: float,
-    allow_networks: Sequence[Network],
+    allow_networks: Iterable[Network],
     page: str | None,
     name_of: NameOf,
 ) -> AsyncIterator[MailChannel]:
     """Open the way to people. Every mail makes a connection of its own, since mails are rare."""
     yield MailChannel(destination, settings, tls, timeout_s, allow_networks, page, name_of)
+
+
+async def _end(sock: socket.socket) -> None:
+    """End a connection. With TLS, asyncio would wait for the server to end it too, and the loop may end before."""
+    with suppress(OSError):  # it has ended
+        sock.shutdown(socket.SHUT_RDWR)
+    with suppress(TimeoutError):
+        async with asyncio.timeout(_END_S):
+            while sock.fileno() != -1:
+                await asyncio.sleep(0.005)
+    sock.close()  # if nothing took it over
 
 
 def mail_of(

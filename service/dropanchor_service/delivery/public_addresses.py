@@ -15,6 +15,7 @@ _SPECIAL_V4 = (
     *("192.0.2.0/24", "192.31.196.0/24", "192.52.193.0/24", "192.88.99.0/24", "192.168.0.0/16", "192.175.48.0/24"),
     *("198.18.0.0/15", "198.51.100.0/24", "203.0.113.0/24", "240.0.0.0/4"),
     "224.0.0.0/4",  # multicast: RFC 5771
+    "168.63.129.16/32",  # Azure's own: https://learn.microsoft.com/azure/virtual-network/what-is-ip-address-168-63-129-16
 )
 # Only 2000::/3 is assigned as global unicast (RFC 4291); the rest of the registry lies outside it.
 _GLOBAL_UNICAST_V6 = ipaddress.IPv6Network("2000::/3")

@@ -7,6 +7,7 @@ from typing import Any
 import orjson
 
 from dropanchor_schemas.destinations import Destination
+from dropanchor_schemas.sentences import say
 from dropanchor_service.events.drafts import Draft
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.runtime.recovery import Recovery
@@ -15,6 +16,7 @@ from dropanchor_service.store.items import PRIVATE, NamedItems, adapter_of
 MAX_DESTINATIONS = 20
 FILE_NAME = "destinations.json"
 WEBHOOKS_FILE_NAME = "webhooks.json"  # of services that knew no other destinations
+NO_DESTINATIONS = say("no_destinations", "there are no destinations")
 
 
 def open_destinations(folder: Path | None, recovery: Recovery | None = None) -> NamedItems[Destination]:
@@ -36,16 +38,17 @@ def addressees(destinations: NamedItems[Destination], draft: Draft) -> Sequence[
 
 def _take_over(webhooks: Path, path: Path, recovery: Recovery) -> None:
     """Make destinations of the webhooks in an older file, if there is one."""
-    found = recovery.read_alone(webhooks, adapter_of(dict[str, Any]).validate_json, "there are no destinations")
+    found = recovery.read_alone(webhooks, adapter_of(dict[str, Any]).validate_json, NO_DESTINATIONS)
     if found:
         destinations = {name: {**webhook, "type": "webhook"} for name, webhook in found.items()}
         write_atomically(path, [orjson.dumps(destinations)], PRIVATE)
 
 
 def _wants(destination: Destination, draft: Draft) -> bool:
+    types = {draft.type, draft.data.get("retracted_type")}  # who got an event learns that it is not true
     return (
         destination.enabled
-        and (not destination.types or draft.type in destination.types)
+        and (not destination.types or not types.isdisjoint(destination.types))
         and (not destination.zones or draft.zone in destination.zones)
         and (not destination.tags or draft.tag in destination.tags or draft.data.get("other_tag") in destination.tags)
     )

@@ -20,13 +20,15 @@ def sentence(event: Event, name_of: NameOf, words: Words) -> str:
     data = event.data
     other = "" if data.other_tag is None else name_of(data.other_tag)
     values = {"tag": name_of(event.subject), "other": other, "place": _place(data)}
-    number, lasted = _number(event, words), _lasted(data, words)
-    return " ".join(words.sentences[event.type].format(**values, number=number, lasted=lasted).split())
+    values |= {"number": _number(event, words), "lasted": _lasted(data, words), "before": _before(data, words)}
+    values["why"] = "" if data.reason is None else words.reasons[data.reason]
+    return " ".join(words.sentences[event.type].format(**values).split())
 
 
 def kind(event: Event, words: Words) -> str:
     """Return what events of several tags have in common, such as `entered Loading dock`."""
-    return " ".join(words.kinds[event.type].format(place=_place(event.data)).split())
+    text = words.kinds[event.type].format(place=_place(event.data), before=_before(event.data, words))
+    return " ".join(text.split())
 
 
 def place_and_time(event: Event, words: Words) -> str:
@@ -54,6 +56,11 @@ def link(page: str, event: Event) -> str:
 
 def _place(data: EventData) -> str:
     return data.name or data.zone or data.rule or ""
+
+
+def _before(data: EventData, words: Words) -> str:
+    """Return the kind of the event that is retracted."""
+    return "" if data.retracted_type is None else words.kinds[data.retracted_type].format(place=_place(data))
 
 
 def _metres(value: float | None, words: Words) -> str:

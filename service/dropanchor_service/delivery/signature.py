@@ -7,6 +7,7 @@ import hmac
 from collections.abc import Mapping
 
 from dropanchor_schemas.destinations import SECRET_PREFIX
+from dropanchor_schemas.sentences import say
 
 MIN_BYTES, MAX_BYTES = 24, 64
 
@@ -37,7 +38,10 @@ def headers(secret: str, event_id: str, timestamp_s: int, body: bytes) -> Mappin
     }
 
 
-_ADVICE = (
-    f"a secret is `{SECRET_PREFIX}` and the Base64 of {MIN_BYTES} to {MAX_BYTES} random bytes; make one with: "
-    f"echo {SECRET_PREFIX}$(openssl rand -base64 32)"
+_ADVICE = say(
+    "secret_form",
+    "a secret is `{prefix}` and the Base64 of {least} to {most} random bytes: the page makes one (New secret)",
+    prefix=SECRET_PREFIX,
+    least=MIN_BYTES,
+    most=MAX_BYTES,
 )

@@ -3,7 +3,7 @@
 import asyncio
 import ssl
 import time
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class WebhookChannel:
     client: httpx.AsyncClient
     lookups: ThreadPoolExecutor
     timeout_s: float
-    allow_networks: Sequence[Network]
+    allow_networks: Iterable[Network]
     portion: ClassVar[Portion] = Portion(AT_ONCE)
 
     async def send(self, events: Sequence[bytes]) -> Sequence[Outcome]:
@@ -76,7 +76,7 @@ class WebhookChannel:
 
 @asynccontextmanager
 async def open_webhook(
-    webhook: WebhookDestination, tls: ssl.SSLContext, timeout_s: float, allow_networks: Sequence[Network]
+    webhook: WebhookDestination, tls: ssl.SSLContext, timeout_s: float, allow_networks: Iterable[Network]
 ) -> AsyncIterator[WebhookChannel]:
     """Open the way to a webhook. It follows no redirects and no proxy settings."""
     lookups = ThreadPoolExecutor(1, "webhook")

@@ -5,18 +5,20 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from dropanchor_schemas.destinations import Language
-from dropanchor_schemas.events import EventType
+from dropanchor_schemas.events import EventType, RetractionReason
 
 
 @dataclass(frozen=True)
 class Words:
     """How a mail says things in one language. sentences: of one event; kinds: what events of several tags share.
 
-    In them stand `{tag}`, `{other}`, `{place}`, `{number}` and `{lasted}` for the values of the event.
+    In them stand `{tag}`, `{other}`, `{place}`, `{number}` and `{lasted}` for the values of the event, and of a
+    retraction `{before}` for the kind of the retracted event and `{why}` for the reason.
     """
 
     sentences: Mapping[EventType, str]
     kinds: Mapping[EventType, str]
+    reasons: Mapping[RetractionReason, str]
     number: Callable[[float, int], str]
     time: Callable[[datetime], str]
     probability: str
@@ -44,6 +46,7 @@ _ENGLISH = Words(
         EventType.TAG_BATTERY_LOW: "The battery of {tag} is low: {number} %",
         EventType.TAG_LOST: "{tag} has been lost for {lasted}",
         EventType.TAG_AMBIGUOUS: "{tag} has been ambiguous for {lasted}",
+        EventType.EVENT_RETRACTED: "Retracted for {tag}: {before} ({why})",
         EventType.DESTINATION_TEST: "This is a test of the destination {tag}",
     },
     kinds={
@@ -55,7 +58,12 @@ _ENGLISH = Words(
         EventType.TAG_BATTERY_LOW: "battery low: {place}",
         EventType.TAG_LOST: "lost: {place}",
         EventType.TAG_AMBIGUOUS: "ambiguous: {place}",
+        EventType.EVENT_RETRACTED: "retracted: {before}",
         EventType.DESTINATION_TEST: "test of {place}",
+    },
+    reasons={
+        RetractionReason.START_DENIED: "the ranges contradict where it was said to start",
+        RetractionReason.START_TAKEN_BACK: "what was said about its start was taken back",
     },
     number=_english_number,
     time=lambda when: f"{when:%Y-%m-%d %H:%M:%S %Z}",
@@ -76,6 +84,7 @@ _GERMAN = Words(
         EventType.TAG_BATTERY_LOW: "Die Batterie von {tag} ist schwach: {number} %",
         EventType.TAG_LOST: "{tag} ist seit {lasted} verloren",
         EventType.TAG_AMBIGUOUS: "{tag} ist seit {lasted} mehrdeutig",
+        EventType.EVENT_RETRACTED: "Zurückgezogen für {tag}: {before} ({why})",
         EventType.DESTINATION_TEST: "Dies ist ein Test des Ziels {tag}",
     },
     kinds={
@@ -87,7 +96,12 @@ _GERMAN = Words(
         EventType.TAG_BATTERY_LOW: "Batterie schwach: {place}",
         EventType.TAG_LOST: "verloren: {place}",
         EventType.TAG_AMBIGUOUS: "mehrdeutig: {place}",
+        EventType.EVENT_RETRACTED: "zurückgezogen: {before}",
         EventType.DESTINATION_TEST: "Test: {place}",
+    },
+    reasons={
+        RetractionReason.START_DENIED: "die Distanzen widersprechen dem angegebenen Startort",
+        RetractionReason.START_TAKEN_BACK: "die Angabe des Startorts wurde zurückgenommen",
     },
     number=_german_number,
     time=lambda when: f"{when:%d.%m.%Y %H:%M:%S %Z}",

@@ -6,6 +6,7 @@ The path or the query of many receivers is their password, and nothing tells suc
 from urllib.parse import urlsplit
 
 from dropanchor_schemas.destinations import Destination, WebhookDestination
+from dropanchor_schemas.sentences import say
 
 NOT_SHOWN = "…"
 
@@ -40,5 +41,7 @@ def completed(destination: Destination, present: Destination | None) -> Destinat
         url = present.url if destination.url == shown_url(present.url) else destination.url
         destination = destination.model_copy(update={"secret": destination.secret or present.secret, "url": url})
     if NOT_SHOWN in destination.url:
-        raise NotShownError(f"{NOT_SHOWN} in the URL stands for what is not shown: give the whole URL")
+        raise NotShownError(
+            say("url_hidden", "{mark} in the URL stands for what is not shown: give the whole URL", mark=NOT_SHOWN)
+        )
     return destination

@@ -3,11 +3,12 @@
 import logging
 import os
 import platform
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
-from dropanchor_service.engines.warm_up import PROGRESS_S, CompilationProgress, how_often, where_kept
+from dropanchor_service.engines.warm_up import ESTIMATOR, PROGRESS_S, CompilationProgress, how_often, where_kept
 from dropanchor_service.runtime.kernel_cache import VARIABLE, sources_stamp
 
 _log = logging.getLogger(__name__)
@@ -21,7 +22,7 @@ def compile_apart(progress: CompilationProgress) -> None:
     if (mark := _mark()) is None or mark.exists() or not _is_writable(mark.parent):
         return
     shown = f"; {progress.page} shows the progress" if progress.page else ""
-    progress.begin("the estimator, which takes about a minute")
+    progress.begin(ESTIMATOR)
     _log.warning("compiling the estimator; please wait. %s%s", how_often(), shown)
     try:
         _run(progress)
@@ -48,7 +49,8 @@ def _run(progress: CompilationProgress) -> None:
                 except subprocess.TimeoutExpired:
                     _log.warning("compiling: %.0f s so far", progress.elapsed_s)
         finally:
-            made.terminate()
+            if made.poll() is None:
+                os.killpg(made.pid, signal.SIGTERM)  # and the process that it has started
 
 
 def mark_complete() -> None:

@@ -10,6 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from dropanchor_schemas.plans import Floor
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Site
 from dropanchor_schemas.wire import (
     ENCODING_PACKED,
@@ -37,14 +39,21 @@ from dropanchor_service.estimation.columns import (
 from dropanchor_service.estimation.plausibility.check import SensorCheck
 from dropanchor_service.ingest.decode import read_forms, read_samples
 from dropanchor_service.ingest.kernels.values import shift_times, time_spans
+from dropanchor_service.ingest.messages import Messages
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.screening import screen
 from dropanchor_service.runtime.kernel_cache import VARIABLE, is_kept
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store.floors import floors_of
 from dropanchor_service.store.groups import Groups
 from dropanchor_service.zones.modes import placed
 from dropanchor_service.zones.pair_watch import PairWatch
 from dropanchor_service.zones.zone_watch import ZoneWatch
+
+ESTIMATOR = say("the_estimator", "the estimator, which takes about a minute")
+_DECODER = say("the_decoder", "the decoder of messages")
+_ENCODER = say("the_encoder", "the encoder of answers")
+_ZONES = say("the_zones", "the zones")
 
 PROGRESS_S = 5.0
 IMPORT_BLOCKED: Final[Any] = None  # in sys.modules it makes an import fail
@@ -77,13 +86,21 @@ class CompilationProgress:
     def sentence(self) -> str:
         """What the service does before it is ready, for people."""
         if not self._what:
-            return "The service is starting."
-        return f"The service compiles {self._what}: {self.elapsed_s:.0f} s so far. {how_often()}."
+            return say("starting", "The service is starting.")
+        return say(
+            "compiling",
+            "The service compiles {what}: {seconds} s so far. {often}.",
+            what=self._what,
+            seconds=f"{self.elapsed_s:.0f}",
+            often=how_often(),
+        )
 
 
 def how_often() -> str:
     """Return how often the kernels are compiled, for people."""
-    return "This happens once after an update" if is_kept() else "This happens at every start; the log says why"
+    if is_kept():
+        return say("compiled_once", "This happens once after an update")
+    return say("compiled_always", "This happens at every start; the log says why")
 
 
 def where_kept() -> str:
@@ -141,13 +158,44 @@ def _without_blas() -> Iterator[None]:
 
 def warm_up(engine: Engine, progress: CompilationProgress | None = None) -> None:
     """Compile the kernels of `engine` with two seconds of a tag that moves off. Discard `engine` afterwards."""
-    with _compiling("the estimator, which takes about a minute", progress or CompilationProgress()):
+    with _compiling(ESTIMATOR, progress or CompilationProgress()):
         _run(engine)
-        check = SensorCheck()
-        for row in range(2):
-            check.start(row)
-        check.check(_moving_off(2))
-        check.note_absurd(np.zeros(1, np.int32), np.zeros(1), np.zeros(1, np.int32))
+        _judge_sensors()
+
+
+def _judge_sensors() -> None:
+    check = SensorCheck()
+    for row in range(2):
+        check.start(row)
+    check.check(_moving_off(2))
+    check.note_absurd(np.zeros(1, np.int32), np.zeros(1), np.zeros(1, np.int32))
+
+
+def warm_up_belief() -> None:
+    """Compile the belief of the engine `fleet` alone, with a measurement of no kind."""
+    from dropanchor_service.estimation.fleet.belief.layout import BELIEF, MAX_HYPOTHESES, ROW, make_workspace
+    from dropanchor_service.estimation.fleet.belief.pool import make_pool
+    from dropanchor_service.estimation.fleet.belief.step import advance
+    from dropanchor_service.estimation.fleet.frontend.node import NODE
+    from dropanchor_service.estimation.fleet.tuning import Tuning
+
+    rows, nodes, beliefs = np.zeros(1, ROW), np.zeros(1, NODE), np.zeros(1, BELIEF)
+    pool, anchors = make_pool(MAX_HYPOTHESES), np.zeros(0, ANCHOR)
+    with _compiling("the belief of the estimator", CompilationProgress()):
+        advance(rows, pool, nodes, anchors, Tuning().record(), make_workspace(), beliefs)
+
+
+def warm_up_front_end() -> None:
+    """Compile all of the engine `fleet` but the belief, with a sample that makes no measurement of motion yet."""
+    from dropanchor_service.estimation.fleet.engine import FleetEngine
+
+    engine, samples = FleetEngine(), _moving_off(1)
+    first = SampleBatch(imu=samples.imu[:1], ranges=samples.ranges[:0], headings=samples.headings[:0])
+    with _compiling("the front-end of the estimator", CompilationProgress()):
+        engine.set_anchors(np.zeros(1, ANCHOR))
+        engine.configure(0, default_settings())
+        engine.process(first)
+        _judge_sensors()
 
 
 def _run(engine: Engine) -> None:
@@ -187,26 +235,28 @@ def warm_up_ingest(progress: CompilationProgress | None = None) -> None:
         boot_clock=True,
     )
     payloads = [encode_packed(frame.replaced(sequence=number)) for number in (0, 2)]
-    with _compiling("the decoder of messages", progress or CompilationProgress()):
+    with _compiling(_DECODER, progress or CompilationProgress()):
         for batch in (payloads, payloads[:1]):
             _ingest(batch)
 
 
 def _ingest(payloads: list[bytes]) -> None:
     read = read_forms(payloads, [ENCODING_PACKED] * len(payloads))
-    publishers, arrivals = Publishers(), np.zeros(len(payloads), np.int64)
-    sequenced = publishers.sequence(read.forms, np.zeros(len(payloads), np.int32), arrivals, 0)
+    publishers, n = Publishers(), len(payloads)
+    of_turn = Messages(read, np.zeros(n, np.int32), np.zeros(n, np.int64), waited=n)
+    sequenced = publishers.sequence(of_turn, 0)
     decoded, _ = screen(read_samples(read, sequenced.due))
     samples = [(decoded.imu["message"], decoded.imu["t_ns"]), (decoded.ranges["message"], decoded.ranges["t_ns"])]
-    offsets = publishers.time_offsets(read.forms, sequenced, arrivals, samples)
+    offsets = publishers.time_offsets(of_turn, sequenced, samples)
     for messages, t_ns in samples:
         shift_times(t_ns, messages, offsets.messages)
-        time_spans(t_ns, messages, np.zeros(len(payloads), np.int64), np.zeros(len(payloads), np.int64))
+        time_spans(t_ns, messages, np.zeros(n, np.int64), np.zeros(n, np.int64))
 
 
 def warm_up_answers(progress: CompilationProgress | None = None) -> None:
     """Compile the kernels of the answers with an old pose and an ambiguous one."""
     answers = Answers(SiteStore(Site(), {}), TagTable(), LatestPoses())
+    answers.site.floors = floors_of([Floor(name="a", bottom_m=0.0, top_m=1.0)])
     poses, hypotheses = np.zeros(2, POSE), np.zeros(2, HYPOTHESIS)
     for row in range(len(poses)):
         answers.tags.register(f"tag-{row}")
@@ -214,7 +264,7 @@ def warm_up_answers(progress: CompilationProgress | None = None) -> None:
     poses["t_ns"] = [0, answers.now_ns()]
     poses["state"], hypotheses["row"] = State.AMBIGUOUS, 1
     answers.latest.write(poses, hypotheses)
-    with _compiling("the encoder of answers", progress or CompilationProgress()):
+    with _compiling(_ENCODER, progress or CompilationProgress()):
         b"".join(answers.pose_list_json())
 
 
@@ -223,7 +273,7 @@ def warm_up_zones(progress: CompilationProgress | None = None) -> None:
     poses, names = np.zeros(2, POSE), ["a", "b"]
     poses["row"], poses["t_ns"], poses["state"], poses["p_mode"] = (0, 1), 1, State.TRACKING, 1.0
     poses["cov"][:, :2, :2] = np.eye(2)
-    with _compiling("the zones", progress or CompilationProgress()):
+    with _compiling(_ZONES, progress or CompilationProgress()):
         found = placed(poses, np.zeros(2), LatestPoses())
         zones = ZoneWatch()
         zones.set_zones([Zone(id="a", shape=Circle(type="circle", x=0.0, y=0.0, radius_m=9.0))], Groups())

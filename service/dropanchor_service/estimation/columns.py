@@ -18,6 +18,7 @@ IMU = np.dtype([("row", "i4"), ("t_ns", "i8"), ("acc", "f8", 3), ("gyro", "f8", 
 RANGE = np.dtype([("row", "i4"), ("t_ns", "i8"), ("anchor", "i4"), ("range", "f8"), ("std", "f8")])
 HEADING = np.dtype([("row", "i4"), ("t_ns", "i8"), ("heading", "f8"), ("std", "f8")])
 BEARING = np.dtype([("row", "i4"), ("t_ns", "i8"), ("anchor", "i4"), ("bearing", "f8"), ("std", "f8")])
+PRESSURE = np.dtype([("row", "i4"), ("t_ns", "i8"), ("pressure", "f8"), ("temperature", "f8")])  # Pa, °C
 
 ANCHOR = np.dtype([("x", "f8"), ("y", "f8"), ("z", "f8")])
 
@@ -36,7 +37,7 @@ TAG_SETTINGS = np.dtype(
         ("speed_max", "f8"),  # m/s, NaN: the engine's default
         ("reverse_allowed", "?"),
         ("heading_source", "u1"),
-        ("heading_std", "f8"),  # rad, of a platform's heading that does not drift; NaN: not known
+        ("heading_std", "f8"),  # rad, of a platform's heading that does not drift, or of north; NaN: not known
         ("magnetometer_calibrated", "?"),
         ("start_known", "?"),
         ("start_x", "f8"),
@@ -49,6 +50,7 @@ TAG_SETTINGS = np.dtype(
         ("gyro_factor", "f8"),
         ("range_factor", "f8"),
         ("acc_sign_told", "?"),  # whether the operator says which way accelerations point
+        ("height_motion", "u1"),
     ]
 )
 
@@ -77,6 +79,9 @@ POSE = np.dtype(
         ("range", "f8"),  # that range, as measured
         ("x", "f8"),
         ("y", "f8"),
+        ("z", "f8"),  # as told, or of the barometer
+        ("z_std", "f8"),
+        ("z_source", "u1"),  # HeightSource
         ("heading", "f8"),
         ("speed", "f8"),
         ("yaw_rate", "f8"),
@@ -111,6 +116,8 @@ INNOVATION = np.dtype(
         ("S", "f8"),  # variance of the innovation
         ("p_outlier", "f8"),  # NaN: the engine has a hard gate instead
         ("fused", "?"),
+        ("white_std", "f4"),  # m, how much ranges scatter anew each time; NaN: not known
+        ("lasting_std", "f4"),  # m, of the errors of ranges that last for seconds
     ]
 )
 
@@ -139,6 +146,23 @@ class Motion(IntEnum):
     AUTO = 0
     VEHICLE = 1
     CARRIED = 2
+
+
+class HeightMotion(IntEnum):
+    """What the height of a tag does. AUTO: it is as told until a pressure comes, and then follows that."""
+
+    AUTO = 0
+    FLAT = 1  # it is as told
+    FREE = 2  # it is unknown and changes
+    REFERENCE = 3  # it is as told, and the tag's barometer shows the weather
+
+
+class HeightSource(IntEnum):
+    """Where the height of a pose comes from."""
+
+    TOLD = 0
+    PRESSURE = 1
+    UNKNOWN = 2
 
 
 class State(IntEnum):
@@ -182,13 +206,14 @@ class SampleBatch:
     """Samples of many tags, per row and kind in order of arrival. The engine puts the kinds in order of time.
 
     The fields stand in the order of the contract's `KINDS`. A column of a kind that measures one number ends in the
-    value and its std. An engine ignores the kinds that it does not use.
+    value and a second number, mostly its std. An engine ignores the kinds that it does not use.
     """
 
     imu: Array = field(default_factory=lambda: np.empty(0, IMU))
     ranges: Array = field(default_factory=lambda: np.empty(0, RANGE))
     headings: Array = field(default_factory=lambda: np.empty(0, HEADING))
     bearings: Array = field(default_factory=lambda: np.empty(0, BEARING))
+    pressures: Array = field(default_factory=lambda: np.empty(0, PRESSURE))
 
     def columns(self) -> tuple[Array, ...]:
         """Return the column of every kind, in the order of `KINDS`."""
@@ -246,6 +271,22 @@ class Restorable(Protocol):
 
     def restore(self, state: dict[str, Array]) -> None:
         """Take over what `state` returned. The engine must not have processed any sample."""
+
+
+@runtime_checkable
+class DeniesStarts(Protocol):
+    """An engine that gives a start up when ranges contradict it."""
+
+    def are_at_start(self, rows: Array) -> Array:
+        """Return whether each of the rows still follows the start in its settings."""
+
+
+@runtime_checkable
+class FollowsPressure(Protocol):
+    """An engine that takes the weather out of pressures."""
+
+    def refer(self, row: int, reference: int) -> None:
+        """Compare the pressures of `row` with those of the row `reference`, -1: none. Its estimate goes on."""
 
 
 def default_settings() -> Array:

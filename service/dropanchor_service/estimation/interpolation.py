@@ -40,12 +40,19 @@ def propagated(pose: Array, t_ns: int) -> Array:
 
 
 def interpolated(before: Array, after: Array, t_ns: int) -> Array:
-    """Return the pose at t_ns between two: linear in continuous fields, the others from the pose that claims less."""
+    """Return the pose at t_ns between two: linear in continuous fields, the others from the pose that claims less.
+
+    A lift may leave at any time, so the variance of the height is that of a mixture, with the share u of the second:
+
+        (1 - u) z_std² + u z_std'² + u (1 - u) (z' - z)²
+    """
     share = (t_ns - int(before["t_ns"])) / (int(after["t_ns"]) - int(before["t_ns"]))
     between = (before if after["state"] == State.TRACKING else after).copy()
     between["t_ns"] = t_ns
-    for name in ("x", "y", "speed", "yaw_rate", "cov", "range", "sigma_pos", "sigma_obs"):
+    for name in ("x", "y", "z", "speed", "yaw_rate", "cov", "range", "sigma_pos", "sigma_obs"):
         between[name] = (1 - share) * before[name] + share * after[name]
+    variance = (1 - share) * before["z_std"] ** 2 + share * after["z_std"] ** 2
+    between["z_std"] = math.sqrt(variance + share * (1 - share) * (after["z"] - before["z"]) ** 2)
     turn = math.remainder(float(after["heading"]) - float(before["heading"]), math.tau)
     between["heading"] = math.remainder(float(before["heading"]) + share * turn, math.tau)
     between["p_mode"] = np.fmin(before["p_mode"], after["p_mode"])

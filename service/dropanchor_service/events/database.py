@@ -12,14 +12,15 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
+from dropanchor_schemas.sentences import said_by, say
 from dropanchor_service.history.sqlite.damaged_file import damage_in, is_damage
-from dropanchor_service.runtime.recovery import Recovery
+from dropanchor_service.runtime.recovery import Recovery, damaged
 
 FILE_NAME = "events.sqlite"
-VERSION = 4
+VERSION = 5
 BUSY_S = 5.0
 CHECK_S = 1.0  # at a start: a large file is checked in part
-INSTEAD = "new events start, and what waited for its destinations is lost"
+INSTEAD = say("new_events", "new events start, and what waited for its destinations is lost")
 
 _STAYS = """
 CREATE TABLE stays (tag TEXT NOT NULL, zone TEXT NOT NULL, entered_ns INTEGER NOT NULL, left_ns INTEGER NOT NULL);
@@ -27,6 +28,12 @@ CREATE INDEX stays_by_end ON stays (left_ns);
 """
 _DEAD_LETTERS = """
 CREATE INDEX dead_letters ON deliveries (destination, again_ns) WHERE dead IS NOT NULL;
+"""
+_STARTS = """
+CREATE TABLE starts (
+    tag TEXT PRIMARY KEY, place TEXT NOT NULL, before TEXT NOT NULL, first INTEGER NOT NULL, since_ns INTEGER NOT NULL,
+    inside TEXT NOT NULL
+) WITHOUT ROWID;
 """
 _STAYS_OF_EVENTS = """
 INSERT INTO stays SELECT tag, zone, entered_ns, since_ns FROM (
@@ -54,6 +61,7 @@ CREATE TABLE deliveries (
 ) WITHOUT ROWID;
 {_DEAD_LETTERS}
 {_STAYS}
+{_STARTS}
 PRAGMA user_version = {VERSION};
 """
 
@@ -88,7 +96,14 @@ class Database:
             try:
                 self._connection()
             except sqlite3.OperationalError as error:
-                self._recovery.note(f"{path.name} cannot be opened ({error}): start the service again when it can be")
+                self._recovery.note(
+                    say(
+                        "file_unopened",
+                        "{file} cannot be opened ({why}): start the service again when it can be",
+                        file=path.name,
+                        why=said_by(error),
+                    )
+                )
 
     @property
     def is_made(self) -> bool:
@@ -139,7 +154,7 @@ class Database:
             except sqlite3.DatabaseError as error:
                 if self._path is None or not is_damage(error):
                     raise
-                self._recovery.set_aside(self._path, f"is damaged ({error})", INSTEAD)
+                self._recovery.set_aside(self._path, damaged(error), INSTEAD)
                 self._open = self._opened()
             weakref.finalize(self, self._open.close).atexit = False  # a thread may still be in a statement then
         return self._open
@@ -170,6 +185,9 @@ class Database:
             connection.executescript(
                 f"BEGIN; ALTER TABLE deliveries ADD again_ns INTEGER; {_DEAD_LETTERS} PRAGMA user_version = 4; COMMIT;"
             )
+            version = 4
+        if version == 4:
+            connection.executescript(f"BEGIN; {_STARTS} PRAGMA user_version = 5; COMMIT;")
             version = VERSION
         if version not in (0, VERSION) or (version == 0 and tables):
             raise EventFileError(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from dropanchor_schemas.events import EventType
+from dropanchor_schemas.events import EventType, RetractionReason
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,36 @@ class Stay(NamedTuple):
     entered_ns: int
     left_ns: int
 
+
+class StartBegan(NamedTuple):
+    """The first thing that came of a start: events of its tag from here on hang on it.
+
+    place, before: as in StartNews. since_ns: no stay that hangs on it began earlier. inside: the zones in which the tag
+    was when the start was told.
+    """
+
+    tag: str
+    place: str
+    before: str
+    since_ns: int
+    inside: Mapping[str, StateValue]
+
+    def made(self, stay: Stay) -> bool:
+        """Return whether a stay hangs on this start: it began or ended after it."""
+        was_inside = self.inside.get(stay.zone)
+        reopened = was_inside is not None and was_inside.since_ns == stay.entered_ns
+        return stay.tag == self.tag and (reopened or stay.entered_ns >= self.since_ns)
+
+
+class StartClosed(NamedTuple):
+    """Nothing hangs on the start of the tag from here on. retracts: why its events are not true; None: they are."""
+
+    tag: str
+    t_ns: int
+    retracts: RetractionReason | None = None
+
+
+Happening = Draft | StartBegan | StartClosed
 
 States = dict[StateKey, StateValue | None]
 """New states by key; None: the state ends."""

@@ -6,11 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from dropanchor_schemas.events import RetractionReason
 from dropanchor_schemas.zones import BatteryLowRule, TooCloseRule
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.events.describe import pair_event, tag_event, zone_event
-from dropanchor_service.events.drafts import Draft, StateKey, States, StateValue, Stay
+from dropanchor_service.events.drafts import Happening, StartBegan, StartClosed, StateKey, States, StateValue, Stay
+from dropanchor_service.events.open_starts import OpenStarts, verdict_on
 from dropanchor_service.store import HealthTable, SiteStore, TagTable
+from dropanchor_service.store.starts import StartNews, StartPhase
 from dropanchor_service.zones.items import ZoneItems
 from dropanchor_service.zones.judge import INSIDE
 from dropanchor_service.zones.pair_watch import PairWatch
@@ -24,7 +27,8 @@ ACTIVE = StateValue(1, 0)
 class WatchedSite:
     """What the watcher reads of a site.
 
-    states: what was stored, so that nothing that is known becomes an event again.
+    states, starts: what was stored, so that nothing that is known becomes an event again, and so that events can be
+    retracted.
     """
 
     store: SiteStore
@@ -32,12 +36,13 @@ class WatchedSite:
     health: HealthTable
     items: ZoneItems
     states: Mapping[StateKey, StateValue] = field(default_factory=dict)
+    starts: Mapping[str, StartBegan] = field(default_factory=dict)
 
 
 class SiteWatch:
     """Follows the states and rules of one site. Its zones are in the `ZoneWatch` of all sites.
 
-    drafts, states, stays: what has happened and is not stored yet.
+    happened, states, stays: what has happened and is not stored yet.
     """
 
     def __init__(
@@ -63,10 +68,11 @@ class SiteWatch:
         self._names: list[str] = []
         self._places: dict[int, int] = {}  # of each row among those of the site
         self._waiting: dict[str, list[StateKey]] = defaultdict(list)  # states of tags that have no row yet
+        self._starts = OpenStarts(site.starts)
         for key in self._states:
             for tag in {key.tag, key.other} - {""}:
                 self._waiting[tag].append(key)
-        self.drafts: list[Draft] = []
+        self.happened: list[Happening] = []
         self.states: States = {}
         self.stays: list[Stay] = []
 
@@ -114,19 +120,38 @@ class SiteWatch:
 
     def forget_tag(self, name: str) -> None:
         """End the stays of a tag that was deleted."""
+        self._close_start(name)
         for key in [key for key in self._states if key.source == "zone" and key.tag == name]:
             self._forget(key)
 
     def note(self, change: ZoneChange) -> None:
         """Note what has happened to a tag in a zone."""
         key = StateKey("zone", change.zone.id, self._name_of(change.row))
+        self._hang(key.tag)
         if change.flags & INSIDE:
             self._set(key, StateValue(change.flags, change.entered_ns))
         else:
             self._end(key, change.left_ns)
         event = zone_event(change, self._name_of)
         if event is not None:
-            self.drafts.append(event)
+            self.happened.append(event)
+
+    def has_start(self, tag: str) -> bool:
+        """Return whether the tag has a start that ranges may still deny, and on which events may hang."""
+        return self._starts.of(tag) is not None
+
+    def follow_start(self, news: StartNews, seen_ns: int) -> None:
+        """Follow what became of the start of a tag. seen_ns: time of its latest pose."""
+        tag = self._name_of(news.row)
+        start = self._starts.of(tag)
+        if news.phase == StartPhase.CONFIRMED:
+            self._starts.confirm(tag, seen_ns)
+        elif start is not None and news.phase != StartPhase.RESUMED and news.place != start.place:
+            self._close_start(tag, verdict_on(start, news))
+        if news.phase == StartPhase.TOLD and news.place:
+            self._zones.restart_delays(news.row)
+            if not self.has_start(tag):
+                self._starts.begin(tag, news, self._zones_of(tag))
 
     def judge_pairs(self, rows: Array, modes: Array, now_ns: int) -> None:
         """Judge the rules for pairs. modes: MODE of each row of this site that has one place."""
@@ -135,7 +160,8 @@ class SiteWatch:
                 key = StateKey("rule", watch.rule.id, *map(self._name_of, change.rows))
                 self._set(key, StateValue(1, change.since_ns) if change.is_close else None)
                 if change.is_close:
-                    self.drafts.append(pair_event(watch.rule, change, now_ns, self._name_of))
+                    self._hang(key.tag, key.other)
+                    self.happened.append(pair_event(watch.rule, change, now_ns, self._name_of))
 
     def judge_tags(self, states: Array, now_ns: int) -> None:
         """Judge the rules for single tags. states: by row of any site."""
@@ -145,7 +171,7 @@ class SiteWatch:
                 key = StateKey("rule", watch.rule.id, self._names[change.place])
                 self._set(key, ACTIVE if change.is_on else None)
                 if change.is_on:
-                    self.drafts.append(tag_event(watch.rule, change, fleet, now_ns, self._names))
+                    self.happened.append(tag_event(watch.rule, change, fleet, now_ns, self._names))
 
     def _batteries(self) -> Array:
         if not any(isinstance(watch.rule, BatteryLowRule) for watch in self._tag_rules.values()):
@@ -156,6 +182,47 @@ class SiteWatch:
         for row in self._rows:
             record = self._site.health.of(row)
             yield np.nan if record is None else record.values.get("battery_fraction", np.nan)
+
+    def _zones_of(self, tag: str) -> dict[str, StateValue]:
+        """Return the zones in which a tag is."""
+        keys = (StateKey("zone", zone, tag) for zone in self._site.items.zones.all)
+        return {key.item: self._states[key] for key in keys if key in self._states}
+
+    def _hang(self, *tags: str) -> None:
+        """Note the starts that an event of these tags hangs on. Call this before the event."""
+        self.happened += [start for tag in tags if (start := self._starts.hang(tag)) is not None]
+
+    def _close_start(self, tag: str, retracts: RetractionReason | None = None) -> None:
+        """Forget the start of a tag. retracts: why what hangs on it is not true."""
+        start = self._starts.close(tag)
+        if start is None:
+            return
+        self.happened.append(StartClosed(tag, self._now_ns(), retracts))
+        self._on_change()
+        if retracts is not None:
+            self._go_back(start)
+
+    def _go_back(self, start: StartBegan) -> None:
+        """Give the tag the states of before its start."""
+        self.stays = [stay for stay in self.stays if not start.made(stay)]
+        row = self._row_of(start.tag)
+        for zone in self._site.items.zones.all:
+            key, before = StateKey("zone", zone, start.tag), start.inside.get(zone)
+            if row is None or self._states.get(key) == before:
+                continue
+            self._zones.forget(zone, row)
+            if before is not None:
+                self._zones.restore(zone, row, *before)
+            self._set(key, before)
+        for key, value in list(self._states.items()):
+            if key.item in self._pairs and start.tag in (key.tag, key.other) and value.since_ns >= start.since_ns:
+                self._forget_pair(key)
+
+    def _forget_pair(self, key: StateKey) -> None:
+        rows = [self._row_of(name) for name in (key.tag, key.other)]
+        if rows[0] is not None and rows[1] is not None:
+            self._pairs[key.item].forget((rows[0], rows[1]))
+        self._set(key, None)
 
     def _name_of(self, row: int) -> str:
         return self._tags.at(row).name

@@ -1,5 +1,6 @@
 """Store events durably, together with the states behind them and their deliveries: one transaction for all three."""
 
+import sqlite3
 import uuid
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,7 +11,8 @@ import orjson
 
 from dropanchor_schemas.events import EventData
 from dropanchor_service.events.database import Database
-from dropanchor_service.events.drafts import Draft, StateKey, States, StateValue, Stay
+from dropanchor_service.events.drafts import Draft, Happening, StartBegan, StateKey, States, StateValue, Stay
+from dropanchor_service.events.starts import add_start, close_start, starts_of
 from dropanchor_service.events.stays import add_stays, prune_stays
 
 PRUNED = 5_000  # events per transaction
@@ -73,23 +75,11 @@ class EventStore:
         """Call this after every commit of events, on the thread that makes it."""
         self._told.append(told)
 
-    def commit(self, drafts: Sequence[Draft], states: States, stays: Sequence[Stay] = ()) -> None:
-        """Store events, states and ended stays, and queue the events for their destinations."""
+    def commit(self, happened: Sequence[Happening], states: States, stays: Sequence[Stay] = ()) -> int:
+        """Store events, states and ended stays, and queue the events for their destinations. Return how many events."""
         with self.database.transaction() as connection:
             first = int(connection.execute(_NEWEST).fetchone()[0]) + 1
-            rows = [
-                (number, draft.type.value, draft.tag, draft.zone, draft.t_ns, cloud_event(draft, number, self.site))
-                for number, draft in enumerate(drafts, first)
-            ]
-            connection.executemany("INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)", rows)
-            connection.executemany(
-                "INSERT INTO deliveries (destination, sequence) VALUES (?, ?)",
-                [
-                    (destination, number)
-                    for number, draft in enumerate(drafts, first)
-                    for destination in self._addressees(draft)
-                ],
-            )
+            following = self._add_all(connection, happened, first)
             connection.executemany(
                 "INSERT OR REPLACE INTO states VALUES (?, ?, ?, ?, ?, ?)",
                 [(*key, *value) for key, value in states.items() if value is not None],
@@ -99,9 +89,45 @@ class EventStore:
                 [key for key, value in states.items() if value is None],
             )
             add_stays(connection, stays)
-        self.newest = first + len(drafts) - 1
-        for told in self._told if drafts else ():
+        self.newest = following - 1
+        for told in self._told if following > first else ():
             told()
+        return following - first
+
+    def _add_all(self, connection: sqlite3.Connection, happened: Sequence[Happening], following: int) -> int:
+        """Store what happened, in order, from this sequence on. Return the one that follows."""
+        drafts: list[Draft] = []
+        for one in happened:
+            if isinstance(one, Draft):
+                drafts.append(one)
+                continue
+            following, drafts = self._add(connection, drafts, following), []
+            if isinstance(one, StartBegan):
+                add_start(connection, one, following)
+            else:
+                drafts = close_start(connection, one)
+        return self._add(connection, drafts, following)
+
+    def _add(self, connection: sqlite3.Connection, drafts: Sequence[Draft], first: int) -> int:
+        """Store events and queue them, from the sequence `first` on. Return the one that follows."""
+        rows = [
+            (number, draft.type.value, draft.tag, draft.zone, draft.t_ns, cloud_event(draft, number, self.site))
+            for number, draft in enumerate(drafts, first)
+        ]
+        connection.executemany("INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)", rows)
+        connection.executemany(
+            "INSERT INTO deliveries (destination, sequence) VALUES (?, ?)",
+            [
+                (destination, number)
+                for number, draft in enumerate(drafts, first)
+                for destination in self._addressees(draft)
+            ],
+        )
+        return first + len(drafts)
+
+    def starts(self) -> dict[str, StartBegan]:
+        """Return the starts on which events hang, by tag."""
+        return starts_of(self.database)
 
     def states(self) -> dict[StateKey, StateValue]:
         """Return all states."""

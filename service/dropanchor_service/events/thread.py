@@ -107,9 +107,8 @@ class EventThread(Worker):
 
     def _save(self, index: int) -> None:
         site = self._watcher.sites[index]
-        self._stores[index].commit(site.drafts, site.states, site.stays)
-        self.stored += len(site.drafts)
-        site.drafts, site.states, site.stays = [], {}, []
+        self.stored += self._stores[index].commit(site.happened, site.states, site.stays)
+        site.happened, site.states, site.stays = [], {}, []
         self._watcher.changed.pop(index, None)
 
     def _due(self) -> Iterator[int]:

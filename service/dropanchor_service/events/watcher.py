@@ -10,6 +10,7 @@ from dropanchor_service.answers.columns import aged_poses
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.events.site_watch import SiteWatch, WatchedSite
 from dropanchor_service.store import LatestPoses
+from dropanchor_service.store.starts import StartNews, StartPhase
 from dropanchor_service.zones.modes import placed
 from dropanchor_service.zones.zone_watch import ZoneWatch
 
@@ -46,12 +47,15 @@ class Watcher:
         self._pose_version = 0
         self._slow_due_ns = self._pairs_due_ns = 0
         self._deleted: frozenset[int] = frozenset()
+        self._unconfirmed: set[int] = set()  # rows whose start the ranges have not confirmed yet
+        self._outdated: dict[int, int] = {}  # time of the latest pose of rows of which it comes from a start of before
         self.is_full = False
         """Whether there are more pairs of tags too close to each other than a rule can follow."""
 
     def on_news(self, told: Callable[[], None]) -> None:
         """Call this after each change that a turn would judge, on the thread that makes it."""
         self._latest.on_change(told)
+        self._rows.start_news.on_change(told)
         for site in self._watched:
             for one in (site.items.zones, site.items.rules, site.store):
                 one.on_change(told)
@@ -63,11 +67,14 @@ class Watcher:
 
     def turn(self) -> None:
         """Judge what is new."""
-        waiting = {index for index in self.changed if len(self.sites[index].drafts) >= MAX_UNSAVED}
+        waiting = {index for index in self.changed if len(self.sites[index].happened) >= MAX_UNSAVED}
         if len(waiting) == len(self.sites):
             return
         self._follow_edits()
+        news = self._rows.start_news.take()
         self._register_tags()
+        for one in news:
+            self._follow_start(one)
         self._follow_deletions()
         now_ns = self._now_ns()
         self._judge_zones(now_ns, waiting)
@@ -102,6 +109,21 @@ class Watcher:
             if index < nobody:
                 self.sites[index].add_tags(tags)
 
+    def _follow_start(self, news: StartNews) -> None:
+        """Judge a tag in zones and pairs from when the ranges have confirmed its start, or nobody follows it."""
+        tag = self._rows.at(news.row)
+        if tag.site >= len(self.sites):
+            return
+        site, pose = self.sites[tag.site], self._latest.row(news.row)
+        site.follow_start(news, self._now_ns() if pose is None else int(pose["t_ns"]))
+        told = news.phase == StartPhase.TOLD and news.place
+        if told or (news.phase == StartPhase.RESUMED and site.has_start(tag.name)):
+            self._unconfirmed.add(news.row)
+        else:
+            self._unconfirmed.discard(news.row)
+        if pose is not None and not news.place and news.phase in (StartPhase.TOLD, StartPhase.DENIED):
+            self._outdated[news.row] = int(pose["t_ns"])
+
     def _follow_deletions(self) -> None:
         deleted = self._rows.deleted
         if deleted is self._deleted:
@@ -117,16 +139,26 @@ class Watcher:
         poses = poses[poses["row"] < len(self._zones)]
         return poses if not waiting else poses[~np.isin(self._rows.sites(poses["row"]), list(waiting))]
 
+    def _confirmed(self, poses: Array) -> Array:
+        """Return the POSE of tags whose place does not only come from what a person said."""
+        if self._outdated:
+            found = poses[np.isin(poses["row"], list(self._outdated))]
+            for row, t_ns in zip(found["row"].tolist(), found["t_ns"].tolist(), strict=True):
+                if t_ns != self._outdated[row]:
+                    del self._outdated[row]
+        left_out = self._unconfirmed | self._outdated.keys()
+        return poses[~np.isin(poses["row"], list(left_out))] if left_out else poses
+
     def _judge_zones(self, now_ns: int, waiting: set[int]) -> None:
         self._pose_version, poses = self._latest.since(self._pose_version)
-        poses = self._known(poses, waiting)
+        poses = self._confirmed(self._known(poses, waiting))
         if not self._zones.has_zones or not len(poses):
             return
         for change in self._zones.judge(placed(poses, self._rows.overdue_s(poses, now_ns), self._latest)):
             self.sites[self._rows.at(change.row).site].note(change)
 
     def _judge_pairs(self, now_ns: int, waiting: set[int]) -> None:
-        poses = self._known(self._latest.since()[1], waiting)
+        poses = self._confirmed(self._known(self._latest.since()[1], waiting))
         rows, modes = placed(poses, self._rows.overdue_s(poses, now_ns), self._latest).single()
         of_site = self._rows.sites(rows)
         order = np.argsort(of_site, kind="stable")

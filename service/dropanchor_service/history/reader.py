@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 
+from dropanchor_service.history.coverage import NO_COVERAGE, Coverage, read_coverage
 from dropanchor_service.history.heat_cells import NO_HEAT
 from dropanchor_service.history.heat_map import HeatMap, heat_map_of, read_heat_map
 from dropanchor_service.history.overview import EMPTY, Overview, read_overview
@@ -50,6 +51,11 @@ class TrackReader(ABC):
         """Return the time that the stored poses cover, ns; None without poses."""
         with self.snapshot() as stored:
             return None if stored is None else stored.span()
+
+    def coverage(self, from_ns: int, to_ns: int, max_parts: int) -> Coverage:
+        """Return when there are poses between the two times, in at most `max_parts` equal parts."""
+        with self.snapshot() as stored:
+            return NO_COVERAGE if stored is None else read_coverage(stored, from_ns, to_ns, max_parts)
 
     def has_tag(self, tag: str) -> bool:
         """Return whether a pose of this tag was ever stored."""

@@ -1,5 +1,6 @@
 """A stored pose as bytes, and back."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,18 +11,24 @@ from dropanchor_service.history.summaries import RELATIVE
 
 SLOT_NS = 10_000_000_000
 
-# The content of a row beside its key, 66 bytes. At 3 km float32 is exact to 0.2 mm.
+# The content of a row beside its key, 75 bytes. At 3 km float32 is exact to 0.2 mm.
 RECORD = np.dtype(
     [
         *(("state", "u1"), ("reason", "u1"), ("anchor", "<i4")),  # state: bit 7 is the frame; anchor: its id, -1: none
         *((name, "<f4") for name in ("range", "x", "y", "heading", "speed", "yaw_rate")),
         ("cov", "<f4", 6),  # xx, xy, xh, yy, yh, hh
-        *((name, "<f4") for name in ("p_mode", "sigma_pos", "sigma_obs")),
+        *((name, "<f4") for name in ("p_mode", "sigma_pos", "sigma_obs", "z", "z_std")),
+        ("z_source", "u1"),
     ]
 )
+NO_HEIGHT = np.array([math.nan, math.nan], "<f4").tobytes() + bytes(1)
+"""The last fields of a RECORD that was written before heights were stored."""
+
 ESTIMATED = {
     "x": "x",
     "y": "y",
+    "z": "z",
+    "z_std_m": "z_std",
     "heading_rad": "heading",
     "speed_mps": "speed",
     "yaw_rate_radps": "yaw_rate",
@@ -31,7 +38,7 @@ ESTIMATED = {
     "range_m": "range",
 }
 """Numbers of an estimate, and the fields of POSE that hold them."""
-_SAME_IN_POSE = ("state", "reason", *ESTIMATED.values())
+_SAME_IN_POSE = ("state", "reason", "z_source", *ESTIMATED.values())
 _UPPER_TRIANGLE = np.triu_indices(3)
 
 
@@ -66,7 +73,9 @@ def records_of(poses: Array, anchors: Array) -> list[bytes]:
 
 
 def stored_poses(rows: Sequence[tuple[int, bytes]], anchor_names: Mapping[int, str]) -> StoredPoses:
-    records = np.frombuffer(b"".join([blob for _, blob in rows]), RECORD)
+    """Return the poses of these rows: time, and RECORD as bytes, which may end before its height."""
+    blobs = [(blob + NO_HEIGHT)[: RECORD.itemsize] for _, blob in rows]
+    records = np.frombuffer(b"".join(blobs), RECORD)
     poses = np.zeros(len(rows), POSE)
     poses["row"], poses["anchor"] = -1, -1
     poses["t_ns"] = [t_ns for t_ns, _ in rows]

@@ -34,6 +34,9 @@ class StoredTracks(Protocol):
     def count_slots(self, from_ns: int, to_ns: int) -> int:
         """Return how many slots of the period have poses."""
 
+    def filled_parts(self, first_slot: int, slots: int, count: int) -> list[int]:
+        """Return the parts with poses, counted from 0, in order. There are `count` parts of so many slots."""
+
     def stretch_bytes(self, kind: Kind, level: int, stretches: range) -> int:
         """Return the size of what `stretches` returns."""
 

@@ -16,11 +16,16 @@ GAP_NS = 10_000_000_000  # nothing is known between two poses that are further a
 MOVING_MPS = 0.1  # the noise of a tag that stands is no distance
 RELATIVE = 0x80  # bit of the state that says that the pose is in a frame of the tag's own
 
+SAME_IN_POINT = ("t_ns", "state", "x", "y", "z", "z_std", "z_source", "heading", "speed", "sigma_pos")
+"""Fields that a POSE and a POINT share."""
+
 POINT = np.dtype(
     [
         ("t_ns", "<i8"),
         ("state", "u1"),  # State, and the bit RELATIVE
         *((name, "<f4") for name in ("x", "y", "heading", "speed", "sigma_pos", "cov_xx", "cov_xy", "cov_yy")),
+        *((name, "<f4") for name in ("z", "z_std")),
+        ("z_source", "u1"),
     ]
 )
 SUMMARY = np.dtype(

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dropanchor_service.estimation.columns import POSE, Array
+from dropanchor_service.history.coverage import Coverage
 from dropanchor_service.history.heat_map import HeatMap
 from dropanchor_service.history.overview import Overview
 from dropanchor_service.history.records import StoredPoses
@@ -74,6 +75,10 @@ class Tracks:
     def span(self) -> tuple[int, int] | None:
         """Return the time that the stored poses cover, ns; None without poses."""
         return self._storage.reader.span()
+
+    def coverage(self, from_ns: int, to_ns: int, max_parts: int) -> Coverage:
+        """Return when there are poses between the two times, in at most `max_parts` equal parts."""
+        return self._storage.reader.coverage(from_ns, to_ns, max_parts)
 
     def has_tag(self, tag: str) -> bool:
         """Return whether poses of this tag were ever stored."""

@@ -14,9 +14,9 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.join import Joined
 from dropanchor_service.importing.progress import shown
 from dropanchor_service.importing.readings import ImportingError, Position
-from dropanchor_tag_client.recording.columns import HEADING, IMU
+from dropanchor_tag_client.recording.columns import FILES, HEADING, IMU
 
-_FILES = tuple(f"{name}.csv{end}" for name in ("anchors", "range", "imu", "heading", "truth") for end in ("", ".gz"))
+_FILES = tuple(f"{file.name}.csv{end}" for file in FILES for end in ("", ".gz"))
 
 
 def require_free(folder: Path, force: bool) -> None:

@@ -37,7 +37,7 @@ class Admission:
         found = self.admit(site, name)
         if found is Reason.TAG_QUARANTINED:
             self._count_pending(site, name, message[2])
-        return self._confirm(site, name, message) if found is Reason.TAG_UNPROVEN else found
+        return self._confirm(site, name, message) if found is Reason.TAG_UNCONFIRMED else found
 
     def admit(self, site: ServedSite, name: str) -> Tag | Reason:
         """Return the tag with this name, registering it if it needs no confirmation, or why it gets no row.
@@ -55,8 +55,8 @@ class Admission:
             return site.tags.register(name)
         if len(site.tags) >= quota.max_tags:
             return Reason.TAGS_FULL
-        if len(self._unconfirmed_of(site)) >= quota.unproven_tags:
-            return Reason.TAG_UNPROVEN
+        if len(self._unconfirmed_of(site)) >= quota.max_unconfirmed_tags:
+            return Reason.TAG_UNCONFIRMED
         tag = site.tags.register(name)
         self._set_unconfirmed(site, np.append(self._unconfirmed_of(site), tag.row))
         return tag
@@ -89,7 +89,7 @@ class Admission:
             return reason
         if self._count_pending(site, name, arrival_ns):
             return site.tags.register(name)
-        return None if site.pending_tags.buffer(name, message) else Reason.TAG_UNPROVEN
+        return None if site.pending_tags.buffer(name, message) else Reason.TAG_UNCONFIRMED
 
     def _count_pending(self, site: ServedSite, name: str, arrival_ns: int) -> bool:
         """Count a message of a pending tag. Return whether its messages so far confirm the tag."""
@@ -102,7 +102,7 @@ class Admission:
 
     def _set_unconfirmed(self, site: ServedSite, rows: Array) -> None:
         self._unconfirmed[site.index] = rows
-        if len(rows) >= site.quota.unproven_tags:
+        if len(rows) >= site.quota.max_unconfirmed_tags:
             self._full.add(site.index)
         else:
             self._full.discard(site.index)

@@ -28,7 +28,7 @@ from dropanchor_service.ingest.kernels.packed import FORM
 
 # `message` is the index of the payload. An IMU_SAMPLE has the memory layout of the engine's IMU, to be viewed as it.
 IMU_SAMPLE = np.dtype([("message", "i4"), ("t_ns", "i8"), ("acc", "f8", 3), ("gyro", "f8", 3), ("mag", "f8", 3)])
-# A sample of one of `SCALARS`; `anchor` is the number on the wire.
+# A sample of one of `SCALARS`; `anchor` is the number on the wire, `std` its second number.
 SCALAR = np.dtype([("message", "i4"), ("t_ns", "i8"), ("anchor", "u4"), ("value", "f8"), ("std", "f8")])
 
 _NO_FIELD = (np.nan, np.nan, np.nan)
@@ -44,9 +44,9 @@ class Forms:
     """
 
     forms: Array
-    rejected: list[tuple[int, Reason]]
-    blob: bytes
-    frames: dict[int, Frame]
+    rejected: list[tuple[int, Reason]] = field(default_factory=list)
+    blob: bytes = b""
+    frames: dict[int, Frame] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

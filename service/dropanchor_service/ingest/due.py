@@ -6,24 +6,23 @@ import numpy as np
 
 from dropanchor_schemas.wire import MAX_T_NS
 from dropanchor_service.estimation.columns import Array
+from dropanchor_service.ingest.messages import Messages
 
 PENDING_OF_TAG = 32  # messages; a tag with more gives up on what is missing, since all tags wait for its next batches
 
 
-def due_of_each(
-    due_ns: int, window_ns: int, of_row: Array, arrived: Array, waited: int, behind: Collection[int]
-) -> int | Array:
+def due_of_each(due_ns: int, window_ns: int, messages: Messages, behind: Collection[int]) -> int | Array:
     """Return the arrival until which messages have waited long enough: `due_ns`, or one for each message.
 
-    of_row, arrived: of the messages, of which the first `waited` have waited before. behind: rows of which more
-    messages are in the buffer. Their window is measured in their own arrivals. Of a row with too many messages that
-    have waited, none waits any longer.
+    behind: rows of which more messages are in the buffer. Their window is measured in their own arrivals. Of a row with
+    too many messages that have waited, none waits any longer.
     """
+    rows, waited = messages.rows, messages.waited
     if not behind and waited <= PENDING_OF_TAG:
         return due_ns
-    newest = np.zeros(int(of_row.max(initial=0)) + 1, np.int64)
-    np.maximum.at(newest, of_row, arrived)
-    is_behind = np.isin(of_row, np.fromiter(behind, np.int64, len(behind)))
-    due: Array = np.where(is_behind, np.minimum(newest[of_row] - window_ns, due_ns), due_ns)
-    due[np.bincount(of_row[:waited], minlength=len(newest))[of_row] > PENDING_OF_TAG] = MAX_T_NS
+    newest = np.zeros(int(rows.max(initial=0)) + 1, np.int64)
+    np.maximum.at(newest, rows, messages.arrived)
+    is_behind = np.isin(rows, np.fromiter(behind, np.int64, len(behind)))
+    due: Array = np.where(is_behind, np.minimum(newest[rows] - window_ns, due_ns), due_ns)
+    due[np.bincount(rows[:waited], minlength=len(newest))[rows] > PENDING_OF_TAG] = MAX_T_NS
     return due

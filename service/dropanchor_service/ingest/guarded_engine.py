@@ -24,6 +24,8 @@ from dropanchor_service.estimation.plausibility.check import Checked, SensorChec
 from dropanchor_service.estimation.plausibility.layout import make_checks
 from dropanchor_service.ingest.anchors import AnchorTable
 from dropanchor_service.ingest.decode import Decoded
+from dropanchor_service.ingest.references import PressureReferences
+from dropanchor_service.ingest.starts import StartWatch
 from dropanchor_service.ingest.units import convert, has_units
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
@@ -63,6 +65,8 @@ class GuardedEngine:
         self._has_units = False  # whether any tag has other units than ours
         self._faults: dict[int, _Faults] = {}
         self._sensors = SensorCheck()
+        self._starts = StartWatch(engine, sites.rows.start_news)
+        self._references = PressureReferences(engine)
 
     @property
     def keeps_state(self) -> bool:
@@ -97,6 +101,8 @@ class GuardedEngine:
             unchanged = tag_columns(current.tag, current.declination_rad).tobytes() == known.tobytes()
             if unchanged and self._sites.of_row(row).index not in moved:
                 self._configured[row] = current
+                self._starts.resume(row, current.tag)
+                self._references.resume(self._sites.of_row(row).index, row, current.tag)
         self._has_configured = np.zeros(len(settings), bool)
         self._has_configured[list(self._configured)] = True
 
@@ -163,6 +169,7 @@ class GuardedEngine:
             self._configure(row)
         checked = self._sensors.check(samples)
         for batch in self._bisected(checked.samples, now_ns) if any(map(len, checked.samples.columns())) else ():
+            self._starts.look(batch)
             self._sensors.mark(batch.poses)
             for column in (batch.poses, batch.innovations):
                 column["anchor"] = self.anchors.own_indices(column["anchor"])
@@ -229,9 +236,13 @@ class GuardedEngine:
         return PoseBatch(poses=_lost(row, t_ns))
 
     def _configure(self, row: int, start_known: bool = True) -> None:
-        current = self._current(row)
+        current, before = self._current(row), self._configured.get(row)
         self._configured[row] = current
         self._has_configured[row] = True
+        if start_known:
+            self._starts.tell(row, current.tag, None if before is None else before.tag)
+        else:
+            self._starts.end(row)
         # After a fault or a restart the tag is no longer where it started.
         tag = current.tag if start_known else current.tag.model_copy(update={"start": None})
         self._engine.configure(row, tag_columns(tag, current.declination_rad))
@@ -239,14 +250,16 @@ class GuardedEngine:
             self._sensors.start(row, current.tag.acc_reversed is not None)
             self._sites.rows.findings.set(row, ())
         self._keep_settings(row, tag_columns(current.tag, current.declination_rad))
+        site = self._sites.of_row(row).index
+        others = (other for other in self._configured if other != row and self._sites.of_row(other).index == site)
+        self._references.follow(site, row, tag, others)
 
     def _keep_settings(self, row: int, settings: Array) -> None:
         if row >= len(self._settings):
             self._settings = enlarged(self._settings, max(row + 1, 2 * len(self._settings)))
         self._settings[row] = settings
-        self._has_units = self._has_units or has_units(
-            settings
-        )  # not over all rows: a storm of tags would take minutes
+        # Not over all rows: a storm of tags would take minutes.
+        self._has_units = self._has_units or has_units(settings)
 
     def _current(self, row: int) -> _Configured:
         """Return the settings that its site has now for this row."""

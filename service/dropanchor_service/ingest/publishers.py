@@ -12,6 +12,7 @@ from dropanchor_service.ingest.kernels import sequences
 from dropanchor_service.ingest.kernels.clocks import TAG_TIME, time_offsets
 from dropanchor_service.ingest.kernels.sequences import PER_TAG, PUBLISHER, WINDOW
 from dropanchor_service.ingest.kernels.values import newest_times
+from dropanchor_service.ingest.messages import Messages
 from dropanchor_service.ingest.motion_offsets.watch import MotionOffsets
 from dropanchor_service.store.clock_offsets import LEAST_DELAYS_S, ClockOffset
 from dropanchor_service.store.records import enlarged
@@ -97,15 +98,13 @@ class Publishers:
     def times(self, times: Array) -> None:
         self._times = times.copy()
 
-    def sequence(
-        self, forms: Array, rows: Array, arrivals: Array, due_ns: int | Array, fresh: int | None = None
-    ) -> Sequenced:
+    def sequence(self, messages: Messages, due_ns: int | Array) -> Sequenced:
         """Put messages into the order of their publishers.
 
-        forms: FORM. rows: of their tags. arrivals: ns, ascending. due_ns: of all or of each: give up on messages that
-        are missing before one that arrived by then. fresh: those from this index on are new; what is missing before
-        them is not given up, since the caches may have it (None: there are none).
+        due_ns: of all or of each: give up on messages that are missing before one that arrived by then. What is missing
+        before a fresh one is not given up, since the caches may have it.
         """
+        forms, rows, arrivals = messages.read.forms, messages.rows, messages.arrived
         self._grow(rows)
         n = len(rows)
         slots, distances, verdicts = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.uint8)
@@ -116,9 +115,10 @@ class Publishers:
         if pending:
             behind = np.flatnonzero(verdicts == sequences.PENDING)
             ordered = behind[np.lexsort((distances[behind], slots[behind]))]
-            first = n if fresh is None else fresh
             due_of = np.full(n, due_ns, np.int64)
-            missing = sequences.release(ordered, slots, forms, arrivals, self._columns, due_of, first, verdicts)
+            missing = sequences.release(
+                ordered, slots, forms, arrivals, self._columns, due_of, messages.waited, verdicts
+            )
             due = np.concatenate([due, ordered[verdicts[ordered] == sequences.PASS]])
         again, waiting = (np.flatnonzero(verdicts == which) for which in (sequences.DUPLICATE, sequences.PENDING))
         return Sequenced(due, waiting, again, missing, int(restarts), slots)
@@ -139,19 +139,19 @@ class Publishers:
         self._columns["gap_allowed"].reshape(-1, PER_TAG)[known] = True
 
     def time_offsets(
-        self, forms: Array, sequenced: Sequenced, arrivals: Array, samples: Sequence[tuple[Array, Array]]
+        self, messages: Messages, sequenced: Sequenced, samples: Sequence[tuple[Array, Array]]
     ) -> TimeOffsets:
         """Return the estimator's time minus the publisher's clock for each message.
 
         samples: for each of `KINDS`, the index of the message and the time of every sample.
         """
-        n = len(forms)
+        forms, n = messages.read.forms, len(messages.rows)
         newest, counts = np.full((n, 3), -1, np.int64), np.zeros((n, 3), np.int64)
         offsets, motion, restarts = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, bool)
-        for kind, (messages, t_ns) in enumerate(samples):
-            newest_times(t_ns, messages, kind, newest, counts)
+        for kind, (indices, t_ns) in enumerate(samples):
+            newest_times(t_ns, indices, kind, newest, counts)
         jumps = time_offsets(
-            *(forms, sequenced.slots, newest, counts, arrivals, sequenced.due, self._columns, self._times),
+            *(forms, sequenced.slots, newest, counts, messages.arrived, sequenced.due, self._columns, self._times),
             *(offsets, motion, restarts),
         )
         used = offsets if offsets.any() else _NONE

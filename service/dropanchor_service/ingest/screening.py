@@ -11,9 +11,16 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.decode import Decoded
 from dropanchor_service.ingest.kernels import values
 
-_COMMON = {values.NOT_FINITE: Reason.NOT_FINITE, values.STD_INVALID: Reason.STD_INVALID}
-_OF_IMU = _COMMON | {values.ABSURD: Reason.IMU_ABSURD}
-_OF_SCALARS = [_COMMON | {values.NEGATIVE: kind.below, values.ABSURD: kind.above} for kind in SCALARS]
+_OF_IMU = {values.NOT_FINITE: Reason.NOT_FINITE, values.ABSURD: Reason.IMU_ABSURD}
+_OF_SCALARS = [
+    {
+        values.NOT_FINITE: Reason.NOT_FINITE,
+        values.NEGATIVE: kind.below,
+        values.ABSURD: kind.above,
+        values.STD_INVALID: kind.second_outside,
+    }
+    for kind in SCALARS
+]
 
 
 @dataclass(frozen=True)
@@ -31,7 +38,7 @@ def screen(decoded: Decoded) -> tuple[Decoded, list[Rejected]]:
     imu, *scalars = decoded.columns()
     columns = [_screened_imu(imu, rejected)]
     for kind, reasons, column in zip(SCALARS, _OF_SCALARS, scalars, strict=True):
-        columns.append(_screened(column, (*kind.limits, *kind.std_limits), reasons, kind.name, rejected))
+        columns.append(_screened(column, (*kind.limits, *kind.second_limits), reasons, kind.name, rejected))
     return decoded.with_columns(columns), rejected
 
 

@@ -8,10 +8,11 @@ from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.times import EARLIEST_UTC_NS
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.ingest.decode import Decoded
+from dropanchor_service.ingest.batch import Batch, times_of
 from dropanchor_service.ingest.kernels.values import shift_times
+from dropanchor_service.ingest.messages import Messages
 from dropanchor_service.ingest.publishers import TimeOffsets
-from dropanchor_service.ingest.screening import Rejected, keep, within_time
+from dropanchor_service.ingest.screening import keep, within_time
 from dropanchor_service.store import Rows
 
 
@@ -21,35 +22,30 @@ class Early(NamedTuple):
     messages: Array
     sent_ns: Array
 
-    def record(self, rows: Rows, of_row: Array, arrived: Array) -> None:
-        """Record a time of each tag. of_row, arrived: of all messages."""
-        messages, first = np.unique(self.messages, return_index=True)
-        for message, sent_ns in zip(messages.tolist(), self.sent_ns[first].tolist(), strict=True):
-            row = int(of_row[message])
-            rows.wrong_times.record(row, rows.at(row).name, sent_ns, int(arrived[message]))
+    def record(self, rows: Rows, messages: Messages) -> None:
+        """Record a time of each tag."""
+        indices, first = np.unique(self.messages, return_index=True)
+        for message, sent_ns in zip(indices.tolist(), self.sent_ns[first].tolist(), strict=True):
+            row = int(messages.rows[message])
+            rows.wrong_times.record(row, rows.at(row).name, sent_ns, int(messages.arrived[message]))
 
 
-def times_of(decoded: Decoded) -> list[tuple[Array, Array]]:
-    """Return the index of the message and the time of each sample, for every kind."""
-    return [(column["message"], column["t_ns"]) for column in decoded.columns()]
-
-
-def in_time(decoded: Decoded, offsets: TimeOffsets, rejected: list[Rejected]) -> tuple[Decoded, list[Early]]:
+def in_time(batch: Batch, offsets: TimeOffsets) -> tuple[Batch, list[Early]]:
     """Add the offset of its message to the time of each sample, and reject samples whose time then cannot be UTC."""
-    imu, *scalars = times_of(decoded)
+    imu, *scalars = times_of(batch.samples)
     outside = shift_times(imu[1], imu[0], offsets.motion)
     outside += sum(shift_times(t_ns, messages, offsets.messages) for messages, t_ns in scalars)
     if not outside:
-        return decoded, []
+        return batch, []
     columns, every = [], []
     of_kinds = [offsets.motion, *[offsets.messages] * len(scalars)]
-    for kind, column, of_messages in zip(KINDS, decoded.columns(), of_kinds, strict=True):
-        kept = keep(column, ~within_time(column["t_ns"]), Reason.TIME_OUT_OF_RANGE, kind.name, rejected)
+    for kind, column, of_messages in zip(KINDS, batch.samples.columns(), of_kinds, strict=True):
+        kept = keep(column, ~within_time(column["t_ns"]), Reason.TIME_OUT_OF_RANGE, kind.name, batch.rejected)
         is_early = kept["t_ns"] < EARLIEST_UTC_NS
         if is_early.any():
             every.append(_early(kept[is_early], of_messages))
-        columns.append(keep(kept, is_early, Reason.TIME_NOT_UTC, kind.name, rejected))
-    return decoded.with_columns(columns), every
+        columns.append(keep(kept, is_early, Reason.TIME_NOT_UTC, kind.name, batch.rejected))
+    return batch._replace(samples=batch.samples.with_columns(columns)), every
 
 
 def _early(samples: Array, offsets: Array) -> Early:

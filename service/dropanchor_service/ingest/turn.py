@@ -218,7 +218,7 @@ class Ingest:
     def _count_shed(self) -> None:
         by_row, samples, unregistered = self._buffer.take_shed()
         self._rejections.count_unregistered(Reason.SHED, unregistered)
-        self._rejections.count_unregistered(Reason.TAG_UNPROVEN, self._admission.take_expired())
+        self._rejections.count_unregistered(Reason.TAG_UNCONFIRMED, self._admission.take_expired())
         if by_row:
             rows = np.fromiter(by_row, np.int64, len(by_row))
             times = np.fromiter(by_row.values(), np.int64, len(by_row))

@@ -24,44 +24,53 @@ class Metrics:
     def __init__(self) -> None:
         self.registry = CollectorRegistry()
         ProcessCollector(registry=self.registry)
-        counter = partial(Counter, registry=self.registry)
-        duration = partial(Histogram, buckets=_SECONDS, registry=self.registry)
-        self.messages = counter("dropanchor_messages", "Messages received from tags.")
-        self.samples = counter("dropanchor_samples", "Samples passed to the estimators.", ["kind"])
-        self.rejected = counter("dropanchor_rejected", "Messages and samples that were rejected.", ["reason"])
-        self.shed_samples = counter(
+        self._counter = partial(Counter, registry=self.registry)
+        self._add_messages()
+        self._add_missing_messages()
+        self._add_estimators()
+        self._add_checkpoints()
+
+    def _add_messages(self) -> None:
+        self.messages = self._counter("dropanchor_messages", "Messages received from tags.")
+        self.samples = self._counter("dropanchor_samples", "Samples passed to the estimators.", ["kind"])
+        self.rejected = self._counter("dropanchor_rejected", "Messages and samples that were rejected.", ["reason"])
+        self.shed_samples = self._counter(
             "dropanchor_shed_samples", "Samples of packed messages that were shed under overload."
         )
-        self.poses = counter("dropanchor_poses", "Poses that the estimators produced.")
-        self.misses = counter(
+        for kind in KINDS:
+            self.samples.labels(kind)
+        for reason in Reason:
+            self.rejected.labels(reason)
+
+    def _add_missing_messages(self) -> None:
+        self.misses = self._counter(
             "dropanchor_missed_messages",
             "Messages that Zenoh noticed to be missing and did not recover. The service then asks the caches of the "
             "tag itself; what it does not get either is given up.",
         )
-        self.given_up = counter(
+        self.given_up = self._counter(
             "dropanchor_given_up_messages",
             "Messages missing from a publisher's sequence that neither arrived in time nor were in its cache.",
         )
-        self.sequence_restarts = counter(
+        self.sequence_restarts = self._counter(
             "dropanchor_sequence_restarts",
             "Publishers that went on with a number that is too far from their last one for missing messages.",
         )
-        self.faults = counter("dropanchor_faults", "Internal errors, by place.", ["where"])
+        self.caught_up = self._counter(
+            "dropanchor_caught_up_messages",
+            "Messages that were suspended while the caches of their tag were queried, and then processed.",
+        )
+
+    def _add_estimators(self) -> None:
+        duration = partial(Histogram, buckets=_SECONDS, registry=self.registry)
+        self.poses = self._counter("dropanchor_poses", "Poses that the estimators produced.")
+        self.faults = self._counter("dropanchor_faults", "Internal errors, by place.", ["where"])
         self.estimator_seconds = duration("dropanchor_estimator_seconds", "Time to fuse one batch of samples.")
         self.delay_seconds = duration(
             "dropanchor_pose_delay_seconds",
             "Time from the arrival of the oldest message of a batch until its poses are in the store.",
         )
-        self.clock_jumps = counter("dropanchor_clock_jumps", "Tag clocks that were set while they ran.")
-        self.caught_up = counter(
-            "dropanchor_caught_up_messages",
-            "Messages that were suspended while the caches of their tag were queried, and then processed.",
-        )
-        self._add_checkpoints()
-        for kind in KINDS:
-            self.samples.labels(kind)
-        for reason in Reason:
-            self.rejected.labels(reason)
+        self.clock_jumps = self._counter("dropanchor_clock_jumps", "Tag clocks that were set while they ran.")
 
     def _add_checkpoints(self) -> None:
         self.checkpoints = Counter(
@@ -107,11 +116,11 @@ class FleetGauges(Collector):
             tags.add_metric([state], count)
         yield tags
         yield GaugeMetricFamily("dropanchor_tags_registered", "Tags that are registered.", len(self._sites.rows))
-        yield GaugeMetricFamily(
-            "dropanchor_newcomers",
-            "Pending tags: they have sent messages but are not registered.",
-            sum(len(site.pending_tags) for site in self._sites),
-        )
+        pending = sum(len(site.pending_tags) for site in self._sites)
+        what = "Pending tags: they have sent messages but are not registered."
+        yield GaugeMetricFamily("dropanchor_tags_pending", what, pending)
+        former = "The former name of dropanchor_tags_pending, until the next version."
+        yield GaugeMetricFamily("dropanchor_newcomers", former, pending)
         yield GaugeMetricFamily(
             "dropanchor_tags_online",
             "Tags that are online: by a liveliness token, an open WebSocket, or HTTP.",

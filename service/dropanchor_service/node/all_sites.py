@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import httpx
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.node.forwarding import Forwarding
 from dropanchor_service.node.request import Asked, RawHeaders
@@ -54,7 +55,9 @@ async def _part(forwarding: Forwarding, bucket: str, asked: Asked) -> Part:
     except ProblemError as error:
         return Part(bucket, why_not=error.detail)
     except (httpx.TransportError, TimeoutError):
-        return Part(bucket, why_not=f"The owner of {bucket} did not complete its answer.")
+        return Part(
+            bucket, why_not=say("owner_incomplete", "The owner of {bucket} did not complete its answer.", bucket=bucket)
+        )
     return Part(bucket, answer.response.status_code, answer.response.headers.raw, body)
 
 
@@ -68,8 +71,8 @@ def joined(parts: Sequence[Part]) -> Iterator[bytes | memoryview]:
     found = [(part.bucket, part.sites) for part in parts]
     missing = [bucket for bucket, sites in found if sites is None]
     if len(missing) == len(found):
-        sentences = " ".join(part.why_not for part in parts if part.why_not)
-        raise ProblemError(Kind.NOT_READY, sentences or "No owner answers.")
+        why_not = [part.why_not for part in parts if part.why_not] or [say("no_owner_answers", "No owner answers.")]
+        raise ProblemError(Kind.NOT_READY, why_not[0] if len(why_not) == 1 else " ".join(why_not))
     between = _BEGIN
     for sites in (sites for _, sites in found if sites):
         yield between

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import httpx
 
+from dropanchor_schemas.sentences import said_by
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.http.of_cluster import epoch_in
 from dropanchor_service.metrics.node import NodeMetrics
@@ -72,7 +73,7 @@ class Forwarding:
                 self._look()
                 may_repeat = asked.body.can_repeat and (asked.is_safe or missed.did_not_arrive)
                 if not may_repeat or not self._owners.is_worth_waiting(bucket):
-                    raise ProblemError(Kind.NOT_READY, str(missed)) from missed
+                    raise ProblemError(Kind.NOT_READY, said_by(missed)) from missed
             self._metrics.repeated.inc()
             await self._links.forget_former()
             await asyncio.sleep(PAUSE_S)
@@ -83,7 +84,7 @@ class Forwarding:
             return self._known(bucket)
         except MissedError as missed:
             self._look()
-            raise ProblemError(Kind.NOT_READY, str(missed)) from missed
+            raise ProblemError(Kind.NOT_READY, said_by(missed)) from missed
 
     def _known(self, bucket: str) -> Owner:
         owner = self._owners.of(bucket)

@@ -11,6 +11,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidMessage
 from websockets.typing import Subprotocol
 
+from dropanchor_schemas.sentences import say
+from dropanchor_service.api.http.closing import reason_of
 from dropanchor_service.api.http.of_cluster import epoch_in
 from dropanchor_service.api.http.web_sockets import MAX_MESSAGE_BYTES
 from dropanchor_service.node import sentences
@@ -82,7 +84,7 @@ async def close(socket: WebSocket, reason: str) -> None:
     with suppress(RuntimeError, WebSocketDisconnect):
         if socket.application_state.name == "CONNECTING":
             await socket.accept()
-        await socket.close(RESTART, reason.encode()[:123].decode(errors="ignore"))
+        await socket.close(RESTART, reason_of(reason, socket.scope))
 
 
 async def _pass_on(socket: WebSocket, upstream: ClientConnection) -> None:
@@ -126,7 +128,7 @@ async def _close_as(upstream: ClientConnection, socket: WebSocket) -> None:
     """Close the client's connection as the owner closed its own."""
     code = upstream.close_code
     if code in (None, _NO_STATUS, _ABNORMAL):
-        await close(socket, "The owner of the site is gone. Connect again.")
+        await close(socket, say("owner_away", "The owner of the site is gone. Connect again."))
         return
     assert code is not None
     with suppress(RuntimeError, WebSocketDisconnect):

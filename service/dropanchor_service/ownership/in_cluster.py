@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from dropanchor_service.checkpoints.objects import ObjectFolder
 
 OF_THE_SITES = {
-    *("engine", "site", "sites", "tags", "tag_defaults", "unknown_tags", "unproven_tags", "max_tags", "paper"),
+    *("engine", "site", "sites", "tags", "tag_defaults", "unknown_tags", "max_unconfirmed_tags", "max_tags", "paper"),
 }
 """Settings that must be equal in all processes that can own a bucket."""
 

@@ -4,13 +4,13 @@ import json
 import secrets
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 from threading import Lock
 from typing import Generic, Protocol, TypeVar
 
-from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, ImuSample, encode_packed
+from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, ImuSample, PressureSample, encode_packed
 from dropanchor_tag_client.sources.phones.pairing import Signs
 from dropanchor_tag_client.sources.phones.readings import PhoneError, require_utc
 from dropanchor_tag_client.sources.phones.session import WAIT_S, Taken
@@ -36,6 +36,9 @@ class Posted(Protocol):
 
     @property
     def battery_fraction(self) -> float | None: ...
+
+    @property
+    def pressures(self) -> Sequence[PressureSample]: ...
 
 
 M = TypeVar("M", bound=Posted)
@@ -114,6 +117,7 @@ class PhoneIntake(Generic[M]):
             taken = recording.session.take(message, self._clock())
             self._publish(recording, taken.samples)
             if not taken.duplicate:
+                self._publish_pressures(recording, message.pressures)
                 self._report(recording, message.battery_fraction)
         require_utc(taken.samples)  # after they were passed on: the service counts them, and says so on the page
         if taken.problem:
@@ -154,6 +158,13 @@ class PhoneIntake(Generic[M]):
     def _publish(self, recording: _Recording[M], samples: list[ImuSample]) -> None:
         for part in _parts(samples):
             frame = Frame(imu=part, sequence=next(recording.sequence), boot_id=recording.boot_id)
+            self._receive(recording.tag, encode_packed(frame), ENCODING_PACKED)
+
+    def _publish_pressures(self, recording: _Recording[M], pressures: Sequence[PressureSample]) -> None:
+        """Pass pressures on as they come: they wait for no other sensor."""
+        for start in range(0, len(pressures), SAMPLES_PER_PAYLOAD):
+            part = list(pressures[start : start + SAMPLES_PER_PAYLOAD])
+            frame = Frame(pressures=part, sequence=next(recording.sequence), boot_id=recording.boot_id)
             self._receive(recording.tag, encode_packed(frame), ENCODING_PACKED)
 
     def _report(self, recording: _Recording[M], battery_fraction: float | None) -> None:

@@ -37,6 +37,7 @@ class Message(NamedTuple):
     streams: Mapping[str, Stream]
     damaged: int
     battery_fraction: None = None
+    pressures: tuple[()] = ()
 
     @property
     def session_id(self) -> str:

@@ -8,13 +8,14 @@ from functools import partial
 from pathlib import Path
 
 from dropanchor_schemas.plans import ImageType, PlanImage
+from dropanchor_schemas.sentences import say
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.runtime.open_below import open_below
 from dropanchor_service.runtime.recovery import Recovery
 
 _ENDINGS: dict[ImageType, str] = {"image/png": ".png", "image/jpeg": ".jpg", "image/svg+xml": ".svg"}
 _DIGEST_CHARACTERS = 32
-INSTEAD = "upload the image of the floor plan again"
+INSTEAD = say("plan_again", "upload the image of the floor plan again")
 _NAME = re.compile(r"[0-9a-f]{32}\.(png|jpg|svg)(\.part)?")
 
 

@@ -5,13 +5,17 @@ import logging
 import sys
 from contextlib import suppress
 
+from dropanchor_schemas.sentences import Sentence, say
 from dropanchor_service.plans.reading.messages import Description, ReadPlan, Request
 from dropanchor_service.plans.reading.refused import RefusedError
 
 TIMEOUT_S = 60.0
 MAX_IMAGE_BYTES = 64 * 2**20
 
-_TOO_HARD = "the file is too large or too complicated to be read here, or damaged. Save it as PNG with fewer pixels"
+_TOO_HARD = say(
+    "plan_too_hard",
+    "the file is too large or too complicated to be read here, or damaged. Save it as PNG with fewer pixels",
+)
 
 _log = logging.getLogger(__name__)
 
@@ -31,10 +35,19 @@ class PlanReader:
             raise RefusedError(_TOO_HARD)
         head, _, image = answer.partition(b"\n")
         if len(image) > MAX_IMAGE_BYTES:
-            raise RefusedError(f"the image needs {len(image) >> 20} MiB. At most {MAX_IMAGE_BYTES >> 20} are allowed")
+            raise RefusedError(
+                say(
+                    "plan_bytes",
+                    "the image needs {size} MiB. At most {most} are allowed",
+                    size=len(image) >> 20,
+                    most=MAX_IMAGE_BYTES >> 20,
+                )
+            )
         description = Description.model_validate_json(head)
         if description.problem:
-            raise RefusedError(description.problem.removesuffix("."))
+            phrase = description.problem_phrase
+            text = description.problem.removesuffix(".")
+            raise RefusedError(text if phrase is None else Sentence(text, phrase.code, phrase.values))
         return ReadPlan(description, image)
 
     async def _answer(self, content: bytes, request: Request) -> bytes | None:

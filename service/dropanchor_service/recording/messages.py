@@ -9,7 +9,8 @@ from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.answers.answers import to_json
 from dropanchor_service.answers.columns import REASONS
 from dropanchor_service.answers.frames import FRAMES, STATES, in_site_frame
-from dropanchor_service.answers.geodesy import lat_lon
+from dropanchor_service.answers.geodesy import altitude, lat_lon
+from dropanchor_service.answers.pose_fields import height_source_values
 from dropanchor_service.estimation.columns import Array, Frame
 from dropanchor_service.history.records import ESTIMATED
 from dropanchor_service.recording import schemas
@@ -20,7 +21,7 @@ SITE_TOPIC = "/site"
 ESTIMATE = "estimate"  # the last part of a topic
 IDENTITY_ROTATION = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 COVARIANCE_APPROXIMATED = 1  # foxglove.LocationFix.position_covariance_type
-UNKNOWN_VARIANCE = 1e6  # m², of the altitude, which is not estimated
+UNKNOWN_VARIANCE = 1e6  # m², of an altitude that is not known
 
 Message = tuple[str, str, bytes]
 """Topic, schema name, JSON."""
@@ -56,9 +57,10 @@ def pose_messages(pose: Array, tag: str, anchor: str | None, document: SiteDocum
     if not math.isfinite(x + y):
         return
     rotation = {"x": 0.0, "y": 0.0, "z": math.sin(heading / 2), "w": math.cos(heading / 2)}
-    settings = document.tags.get(tag)
+    settings, z = document.tags.get(tag), float(pose["z"])
+    told = 0.0 if settings is None else settings.height_m
     placement = {
-        "position": {"x": x, "y": y, "z": 0.0 if settings is None else settings.height_m},
+        "position": {"x": x, "y": y, "z": z if math.isfinite(z) else told},
         "orientation": rotation if math.isfinite(heading) else IDENTITY_ROTATION,
     }
     relative = pose["frame"] == Frame.RELATIVE
@@ -78,6 +80,8 @@ def _estimate(pose: Array, anchor: str | None) -> dict[str, object]:
         "frame": FRAMES[pose["frame"]],
         **_numbers(published, ESTIMATED),
     }
+    if math.isfinite(pose["z"]):
+        fields["z_source"] = height_source_values(pose[None])[0]
     if pose["frame"] == Frame.RELATIVE and math.isfinite(pose["x"]):
         fields["relative_pose"] = _numbers(pose, schemas.OF_RELATIVE)
     return fields if anchor is None else fields | {"anchor": anchor}
@@ -93,20 +97,23 @@ def _numbers(pose: Array, names: Iterable[str]) -> dict[str, object]:
 def _location(pose: Array, document: SiteDocument) -> dict[str, object]:
     """Return a foxglove.LocationFix. Its covariance is in east, north and up.
 
-    The altitude is not estimated. JSON has no NaN, so it is 0 with a variance that says that nothing is known.
+    JSON has no NaN, so an altitude that is not known is 0 with a variance that says so.
     """
-    assert document.site.georeference is not None
-    lat, lon = lat_lon(document.site.georeference, pose["x"], pose["y"])
-    angle = document.site.georeference.rotation_rad
+    origin = document.site.georeference
+    assert origin is not None
+    lat, lon = lat_lon(origin, pose["x"], pose["y"])
+    alt_m = altitude(origin, pose["z"])
+    has_altitude = alt_m is not None and math.isfinite(alt_m + pose["z_std"])
+    angle = origin.rotation_rad
     enu_from_site = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-    covariance = np.diag([0.0, 0.0, UNKNOWN_VARIANCE])
+    covariance = np.diag([0.0, 0.0, pose["z_std"] ** 2 if has_altitude else UNKNOWN_VARIANCE])
     covariance[:2, :2] = enu_from_site @ pose["cov"][:2, :2] @ enu_from_site.T
     known = bool(np.isfinite(covariance).all())
     return {
         "frame_id": FRAME,
         "latitude": float(lat),
         "longitude": float(lon),
-        "altitude": 0.0,
+        "altitude": float(alt_m) if alt_m is not None and has_altitude else 0.0,
         "position_covariance": covariance.reshape(-1).tolist() if known else [0.0] * 9,
         "position_covariance_type": COVARIANCE_APPROXIMATED if known else 0,
     }

@@ -48,7 +48,7 @@ def all_schemas() -> dict[str, Schema]:
         ESTIMATE: _object(
             t_ns=_INTEGER,
             covariance=_NINE,
-            **dict.fromkeys(("state", "reason", "frame", "anchor"), _TEXT),
+            **dict.fromkeys(("state", "reason", "frame", "anchor", "z_source"), _TEXT),
             **dict.fromkeys(ESTIMATED, _NUMBER),
             relative_pose=_object(**dict.fromkeys(OF_RELATIVE, _NUMBER), covariance=_NINE),
         ),

@@ -2,7 +2,7 @@
 
 OF_SITE = (
     *("site.json*", "plans", "plans.json*", "history.sqlite*", "recordings", "events.sqlite*", "zones.json*"),
-    *("event_rules.json*", "destinations.json*", "webhooks.json*", "omlox_*.json*"),
+    *("event_rules.json*", "destinations.json*", "webhooks.json*", "receiver_networks.json*", "omlox_*.json*"),
 )
 """Patterns of what belongs to one site, and moves with it."""
 OF_SERVICE = (

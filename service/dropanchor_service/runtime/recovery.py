@@ -15,12 +15,14 @@ from typing import NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.runtime.atomic_file import UP_TO_UMASK, sync_folder, write_atomically
 
 COPY = ".last-good"
 MARK = ".damaged-"
-COPY_USED = "its last good copy is used"
-BEGINS_EMPTY = "there was no good copy, so it begins empty"
+COPY_USED = say("copy_used", "its last good copy is used")
+BEGINS_EMPTY = say("begins_empty", "there was no good copy, so it begins empty")
+DAMAGED = say("is_damaged", "is damaged")
 MAX_ASIDE = 3  # of a file: a disk that keeps damaging files must not fill up with them
 _WHERE = ("*", "checkpoints/*", "plans/*", "sites/*/*", "sites/*/plans/*")  # what one service may have set aside
 _UNKNOWN = ("extra_forbidden", "union_tag_invalid", "literal_error", "enum")  # what a later version may have written
@@ -50,7 +52,12 @@ class Recovery:
         self._root = root
         self._found: list[_Found] = []
         for aside in [] if root is None else _set_aside_below(root):
-            self._found.append(_Found(aside, f"{self._name(_of_aside(aside))} was damaged at an earlier start"))
+            self._found.append(
+                _Found(
+                    aside,
+                    say("damaged_earlier", "{file} was damaged at an earlier start", file=self._name(_of_aside(aside))),
+                )
+            )
 
     def read(self, path: Path, parse: Parse[Content], mode: int = UP_TO_UMASK) -> Content | None:
         """Return what is in a file that has a copy; None if there is none, or no good one.
@@ -111,7 +118,12 @@ class Recovery:
         return [
             found.sentence
             if found.aside is None
-            else f"{found.sentence}: look at {self._name(found.aside)}, then move it away"
+            else say(
+                "aside",
+                "{what}: look at {aside}, then move it away",
+                what=found.sentence,
+                aside=self._name(found.aside),
+            )
             for found in self._found
             if found.aside is None or found.aside.exists()
         ]
@@ -147,9 +159,13 @@ class Recovery:
         self._report(path, aside, why, COPY_USED)
 
     def _report(self, path: Path, aside: Path | None, why: str, instead: str) -> None:
-        sentence = f"{self._name(path)} {why}; {instead}"
+        sentence = say("file_unusable", "{file} {why}; {instead}", file=self._name(path), why=why, instead=instead)
         if aside is None:
-            sentence += ". It is not set aside: look at the permissions of its folder, and at what earlier starts left"
+            sentence = say(
+                "not_aside",
+                "{what}. It is not set aside: look at the permissions of its folder, and at what earlier starts left",
+                what=sentence,
+            )
         _log.error("%s (%s)", sentence, f"in {path.parent}" if aside is None else f"kept as {aside}")
         self._found.append(_Found(aside, sentence))
 
@@ -158,6 +174,14 @@ class Recovery:
         if self._root is not None and path.is_relative_to(self._root):
             return str(path.relative_to(self._root))
         return path.name
+
+
+def damaged(why: object) -> str:
+    return say("is_damaged_so", "is damaged ({why})", why=why)
+
+
+def unreadable(error: OSError) -> str:
+    return say("is_unreadable", "cannot be read ({why})", why=error.strerror)
 
 
 def write_with_copy(path: Path, content: bytes, mode: int = UP_TO_UMASK) -> None:
@@ -203,8 +227,8 @@ def _content(path: Path) -> bytes | None:
 
 def _why(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror:
-        return f"cannot be read ({error.strerror})"
-    return "is damaged"
+        return unreadable(error)
+    return DAMAGED
 
 
 def _refuse_newer(path: Path, error: Exception) -> None:

@@ -17,12 +17,13 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id, refuse_pattern
+from dropanchor_schemas.sentences import say
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.security.files import PRIVATE, exclusive_lock
-from dropanchor_service.security.identity import Identity, Scope, UnauthenticatedError
+from dropanchor_service.security.identity import Authenticator, Identity, Scope, UnauthenticatedError
 
 FILE = "api_keys.json"
-SOURCE = "key"
+SOURCE = say("source_key", "key")
 PREFIX = "dropanchor_"
 CHECK_S = 1.0  # how often to look for changes of the file
 
@@ -79,6 +80,8 @@ class ApiKeys:
         self._keys = self._read()
 
     def all(self) -> Mapping[str, ApiKey]:
+        """Return the keys by id."""
+        self._reload_if_changed()
         return self._keys
 
     def add(self, name: str, scope: Scope, days: int | None = None, site: str | None = None) -> str:
@@ -128,24 +131,35 @@ class ApiKeys:
                 raise ApiKeyError(f"there is no key named {name!r}")
             self._write(remaining)
 
+    def revoke_id(self, identifier: str) -> bool:
+        """Remove the key with this id. Return whether there was one. Raises ApiKeyError when the file is damaged."""
+        with exclusive_lock(self._file.parent):
+            keys = self._read()
+            is_known = keys.pop(identifier, None) is not None
+            if is_known:
+                self._write(keys)
+        return is_known
+
     def recognises(self, secret: str) -> bool:
         return secret.startswith(PREFIX)
 
     def identify(self, secret: str) -> Identity:
         """Return the identity of a key. Raises UnauthenticatedError when it is unknown, revoked or expired."""
         self._reload_if_changed()
-        key = self._keys.get(secret.removeprefix(PREFIX).partition("_")[0])
+        identifier = secret.removeprefix(PREFIX).partition("_")[0]
+        key = self._keys.get(identifier)
         if key is None or not hmac.compare_digest(key.sha256, _hash(secret)):
-            raise UnauthenticatedError("the API key is unknown or was revoked")
+            raise UnauthenticatedError(say("why_key_unknown", "the API key is unknown or was revoked"))
         if key.is_expired:
-            raise UnauthenticatedError("the API key has expired")
+            raise UnauthenticatedError(say("why_key_expired", "the API key has expired"))
         if key.site is None or key.scope is None:
-            return Identity(SOURCE, key.name, key.scope, tag=key.tag, site=key.site)
-        return Identity(SOURCE, key.name, None, of_sites={key.site: key.scope})
+            return Identity(SOURCE, key.name, key.scope, tag=key.tag, site=key.site, key=identifier)
+        return Identity(SOURCE, key.name, None, of_sites={key.site: key.scope}, key=identifier)
 
     def is_still_valid(self, identity: Identity) -> bool:
         self._reload_if_changed()
-        return any(key.name == identity.name and not key.is_expired for key in self._keys.values())
+        key = None if identity.key is None else self._keys.get(identity.key)
+        return key is not None and not key.is_expired
 
     def _reload_if_changed(self) -> None:
         if self._clock() - self._checked_s < CHECK_S:
@@ -154,11 +168,11 @@ class ApiKeys:
         version = self._file_version()
         if version == self._version:
             return
-        self._version = version
         try:
             self._keys = self._read()
         except ApiKeyError as error:
             _log.error("%s; the keys read before stay valid until the file is repaired", error)
+        self._version = version  # last: if another thread wrote meanwhile, the next look reads its keys
 
     def _file_version(self) -> tuple[int, int] | None:
         try:
@@ -185,6 +199,12 @@ class ApiKeys:
         content = json.dumps(document, indent=2, ensure_ascii=False)
         write_atomically(self._file, [content.encode(), b"\n"], PRIVATE)
         self._keys, self._version = dict(keys), self._file_version()
+
+
+def api_keys_of(authenticator: Authenticator | None) -> ApiKeys | None:
+    """Return the API keys that this authenticator accepts; None when it accepts none."""
+    keys = None if authenticator is None else authenticator.provider(SOURCE)
+    return keys if isinstance(keys, ApiKeys) else None
 
 
 def _hash(secret: str) -> str:

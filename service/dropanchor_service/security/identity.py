@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol, Self
 
+from dropanchor_schemas.sentences import say
+
 
 class Scope(IntEnum):
     """A permission level; each includes the lower ones."""
@@ -40,7 +42,8 @@ class Identity:
 
     source: the identity provider. scope: what the client may do in every site; None: nothing. expires_s: Unix time;
     None: never. tag: the tag whose samples the client may send; None: no tag. limit: the only tags that it may read;
-    None: all. site: that of `tag`; None: the only one. of_sites: what the client may do in single sites.
+    None: all. site: that of `tag`; None: the only one. of_sites: what the client may do in single sites. key: the id of
+    its API key, which another key of the same name does not have.
     """
 
     source: str
@@ -51,6 +54,7 @@ class Identity:
     limit: Limit | None = None
     site: str | None = None
     of_sites: Mapping[str, Scope] = field(default_factory=dict)
+    key: str | None = None
 
     def scope_in(self, site: str | None) -> Scope | None:
         """Return what the client may do in a site; None: nothing. site: None for what concerns all sites."""
@@ -93,7 +97,9 @@ class Authenticator:
         for provider in self._providers.values():
             if provider.recognises(secret):
                 return provider
-        raise UnauthenticatedError("the credential is neither an API key nor a token that this service accepts")
+        raise UnauthenticatedError(
+            say("why_no_credential", "the credential is neither an API key nor a token that this service accepts")
+        )
 
     def is_still_valid(self, identity: Identity) -> bool:
         return self._providers[identity.source].is_still_valid(identity)

@@ -8,11 +8,12 @@ from typing import Any
 
 import jwt
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.security.identity import Identity, Scope, UnauthenticatedError
 from dropanchor_service.settings.model import OidcSettings, is_safe_url
 from dropanchor_service.settings.sites import ScopeName
 
-SOURCE = "token"
+SOURCE = say("source_token", "token")
 ALGORITHMS = ("RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512", "EdDSA")
 LEEWAY_S = 30.0
 REFRESH_S = 300.0

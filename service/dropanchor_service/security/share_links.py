@@ -10,13 +10,14 @@ from threading import Lock
 
 from pydantic import TypeAdapter
 
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.shares import Share, ShareRequest
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.security.files import PRIVATE, exclusive_lock
 from dropanchor_service.security.identity import Authenticator, Identity, Limit, Scope, UnauthenticatedError
 
-SOURCE = "share link"
+SOURCE = say("source_link", "share link")
 PREFIX = "dropanchor_share_"
 KEY_FILE, TABLE_FILE = "share_key", "share_links.json"
 KEY_BYTES = 32
@@ -27,7 +28,7 @@ NS = 1_000_000_000
 _ALGORITHM = "HS256"
 _AUDIENCE = "dropanchor-share"
 _TABLE = TypeAdapter(dict[str, Share])
-ENDED = "all share links have ended"
+ENDED = say("links_ended", "all share links have ended")
 
 
 class TooManyLinksError(Exception):
@@ -113,14 +114,18 @@ class ShareLinks:
                 options={"verify_exp": False, "require": ["jti", "exp", "aud"]},  # `exp` is judged by our own clock
             )
         except jwt.PyJWTError as error:
-            raise UnauthenticatedError("the share link is damaged, or another service made it") from error
+            raise UnauthenticatedError(
+                say("why_link_damaged", "the share link is damaged, or another service made it")
+            ) from error
         link = self._links.get(str(claims["jti"]))
         if self._clock() >= claims["exp"]:
-            raise UnauthenticatedError("the share link has expired")
+            raise UnauthenticatedError(say("why_link_expired", "the share link has expired"))
         if link is None:
-            raise UnauthenticatedError("the share link was revoked")
+            raise UnauthenticatedError(say("why_link_revoked", "the share link was revoked"))
         if link.site is None:
-            raise UnauthenticatedError("the share link does not say of which site it is: create another one")
+            raise UnauthenticatedError(
+                say("why_link_siteless", "the share link does not say of which site it is: create another one")
+            )
         limit = None if link.tag is None and link.group is None else Limit(link.tag, link.group)
         return Identity(SOURCE, link.id, None, link.expires_ns / NS, limit=limit, of_sites={link.site: Scope.READ})
 
@@ -152,7 +157,14 @@ class ShareLinks:
         try:
             write_atomically(path, [key], PRIVATE)
         except OSError as error:
-            self._recovery.note(f"{path.name} cannot be written ({error.strerror}): share links end with this process")
+            self._recovery.note(
+                say(
+                    "file_unwritten",
+                    "{file} cannot be written ({why}): share links end with this process",
+                    file=path.name,
+                    why=error.strerror,
+                )
+            )
         return key
 
     def _with_site(self, link: Share) -> Share:

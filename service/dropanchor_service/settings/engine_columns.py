@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dropanchor_schemas.site import Anchor, TagSettings
-from dropanchor_service.estimation.columns import ANCHOR, Array, HeadingSource, Motion, default_settings
+from dropanchor_service.estimation.columns import ANCHOR, Array, HeadingSource, HeightMotion, Motion, default_settings
 
 ACC_UNITS = {"m/s2": 1.0, "g": 9.80665, "mg": 0.00980665}
 GYRO_UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
@@ -22,6 +22,7 @@ def tag_columns(tag: TagSettings, declination_rad: float) -> Array:
     """Return TAG_SETTINGS (0-d). Settings that are not given are NaN. declination_rad: of the site."""
     columns = default_settings()
     columns["height"] = tag.height_m
+    columns["height_motion"] = HeightMotion[tag.height_motion.upper()]
     columns["range_std"] = _or_nan(tag.range_std_m)
     columns["range_bias"] = tag.range_bias_m
     columns["range_bias_std"] = _or_nan(tag.range_bias_std_m)

@@ -20,7 +20,7 @@ class EventSettings(_Section):
         default=200.0, description="Period in which new poses are compared with the zones and rules."
     )
     keep_days: Annotated[float, Field(gt=0, le=36_500)] = Field(default=30.0, description="Delete older events.")
-    most_mib: Annotated[float, Field(ge=1)] = Field(
+    max_mib: Annotated[float, Field(ge=1)] = Field(
         default=1024.0, description="Size of the stored events; the oldest make room."
     )
 

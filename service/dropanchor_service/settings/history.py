@@ -50,7 +50,7 @@ class HistorySettings(_Section):
         "interpolated in between.",
     )
     keep_days: Annotated[float, Field(gt=0, le=36_500)] = Field(default=30.0, description="Delete older poses.")
-    most_mib: Annotated[float, Field(ge=1)] = Field(
+    max_mib: Annotated[float, Field(ge=1)] = Field(
         default=4096.0,
         description="Size of the history; the oldest poses make room. In a database: of all sites together.",
     )
@@ -74,6 +74,6 @@ class RecordingSettings(_Section):
     file_minutes: Annotated[float, Field(gt=0)] = Field(default=60.0, description="Finish a file that is older.")
     keep_files: Annotated[int, Field(ge=1)] = Field(default=10_000, description="Number of files to keep.")
     keep_days: Annotated[float, Field(gt=0, le=36_500)] = Field(default=30.0, description="Delete older files.")
-    most_mib: Annotated[float, Field(ge=1)] = Field(
+    max_mib: Annotated[float, Field(ge=1)] = Field(
         default=16_384.0, description="Size of all files; the oldest make room."
     )

@@ -161,10 +161,10 @@ class Settings(_Section):
     )
     unknown_tags: UnknownTags = Field(
         default="accept",
-        description="What to do with a tag that is not listed here. In quarantine it waits, listed under newcomers, "
+        description="What to do with a tag that is not listed here. In quarantine it waits, listed as pending, "
         "until somebody puts its settings.",
     )
-    unproven_tags: Annotated[int, Field(ge=0, le=1_000_000)] = Field(
+    max_unconfirmed_tags: Annotated[int, Field(ge=0, le=1_000_000)] = Field(
         default=200,
         description="How many unlisted tags may have an estimator after one message. Beyond that, a new tag gets one "
         "with its second message.",
@@ -200,7 +200,7 @@ class Settings(_Section):
     @property
     def quota(self) -> Quota:
         """Which tags a site admits, unless its own table says otherwise."""
-        return Quota(self.unknown_tags, self.unproven_tags, self.max_tags)
+        return Quota(self.unknown_tags, self.max_unconfirmed_tags, self.max_tags)
 
     @property
     def listed_tags(self) -> dict[str, TagSettings]:

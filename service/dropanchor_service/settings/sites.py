@@ -17,8 +17,8 @@ class SiteSettings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     unknown_tags: UnknownTags | None = Field(default=None, description="`unknown_tags` of this site.")
-    unproven_tags: Annotated[int, Field(ge=0, le=1_000_000)] | None = Field(
-        default=None, description="`unproven_tags` of this site."
+    max_unconfirmed_tags: Annotated[int, Field(ge=0, le=1_000_000)] | None = Field(
+        default=None, description="`max_unconfirmed_tags` of this site."
     )
     max_tags: Annotated[int, Field(ge=1, le=1_000_000)] | None = Field(
         default=None, description="`max_tags` of this site."
@@ -43,5 +43,5 @@ class SiteSettings(BaseModel):
 
     def quota(self, default: Quota) -> Quota:
         """Return which tags the site admits. default: where its table says nothing."""
-        given = {name: getattr(self, name) for name in ("unknown_tags", "unproven_tags", "max_tags")}
+        given = {name: getattr(self, name) for name in ("unknown_tags", "max_unconfirmed_tags", "max_tags")}
         return Quota(**(vars(default) | {name: value for name, value in given.items() if value is not None}))

@@ -11,6 +11,7 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 
 from dropanchor_schemas.site import Typed
+from dropanchor_service.settings.former_names import FORMER, with_present_names
 from dropanchor_service.settings.model import Settings
 
 ENVIRONMENT_PREFIX = "DROPANCHOR_"
@@ -30,11 +31,12 @@ def load_settings(
 
     Raises SettingsError.
     """
-    layers = [
-        (str(file), _from_file(file)),
-        ("the environment", _from_environment(environment)),
-        ("the command line", dict(options or {})),
-    ]
+    given = {
+        str(file): _from_file(file),
+        "the environment": _from_environment(environment),
+        "the command line": dict(options or {}),
+    }
+    layers = [(source, with_present_names(source, settings)) for source, settings in given.items()]
     merged: dict[str, Any] = {}
     for _, layer in layers:
         merged = _merged(merged, layer)
@@ -67,7 +69,7 @@ def _from_environment(environment: Mapping[str, str]) -> dict[str, Any]:
         if not variable.startswith(ENVIRONMENT_PREFIX):
             continue
         path = variable.removeprefix(ENVIRONMENT_PREFIX).lower().split(ENVIRONMENT_DELIMITER)
-        if len(path) > 1 or path[0] in Settings.model_fields:
+        if len(path) > 1 or path[0] in Settings.model_fields or tuple(path) in FORMER:
             found = _merged(found, _nested(path, _value(variable, text)))
     return found
 

@@ -7,6 +7,9 @@ import numpy as np
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.records import take
 
+_KEPT = np.dtype([("t_ns", "i8"), ("x", "f8"), ("y", "f8"), ("z", "f8"), ("state", "i2"), ("frame", "u1")])
+CLIMB_M = 0.5  # of a tag that climbs; the height that a barometer shows of one that stands wanders by less
+
 
 class FirstOfSlot:
     """Selects the first pose of every row and time slot. Not thread-safe: its owner locks."""
@@ -33,15 +36,15 @@ class FirstOfSlot:
 class Decimation:
     """Keeps at most one pose per row and period, and drops poses that add little.
 
-    A pose is kept when it is `distance_m` away from the last kept pose of its row, has another state or frame, or comes
-    `still_ns` after it. Not thread-safe.
+    A pose is kept when it is `distance_m` away from the last kept pose of its row, CLIMB_M higher or lower, has another
+    state or frame, or comes `still_ns` after it. Not thread-safe.
     """
 
     def __init__(self, period_ns: int, distance_m: float = 0.0, still_ns: int = 0) -> None:
         self._first_of_slot = FirstOfSlot(period_ns)
         self._distance_m = distance_m
         self._still_ns = still_ns
-        self._kept = np.zeros(0, np.dtype([("t_ns", "i8"), ("x", "f8"), ("y", "f8"), ("state", "i2"), ("frame", "u1")]))
+        self._kept = np.zeros(0, _KEPT)
 
     def select(self, poses: Array) -> Array:
         """Return the poses to keep. poses: POSE, in order of time per row."""
@@ -66,14 +69,15 @@ class Decimation:
         before = self._kept[poses["row"]]
         with np.errstate(invalid="ignore"):  # an unknown position is not near
             near = np.hypot(poses["x"] - before["x"], poses["y"] - before["y"]) < self._distance_m
+            climbed = np.abs(poses["z"] - before["z"]) >= CLIMB_M
         both_unknown = np.isnan(poses["x"]) & np.isnan(before["x"])
         soon = np.abs(poses["t_ns"] - before["t_ns"]) < self._still_ns
         alike = (poses["state"] == before["state"]) & (poses["frame"] == before["frame"])
-        same: Array = (near | both_unknown) & soon & alike
+        same: Array = (near | both_unknown) & ~climbed & soon & alike
         return same
 
     def _remember(self, poses: Array) -> None:
-        for name in ("t_ns", "x", "y", "state", "frame"):
+        for name in self._kept.dtype.names or ():
             self._kept[name][poses["row"]] = poses[name]
 
     def _grow(self, rows: int) -> None:

@@ -15,6 +15,7 @@ from dropanchor_service.store.findings import SensorFindings
 from dropanchor_service.store.presence import OnlineUntil, Presence
 from dropanchor_service.store.recent import Recent
 from dropanchor_service.store.records import enlarged, take
+from dropanchor_service.store.starts import StartNewsQueue
 from dropanchor_service.store.wrong_times import WrongTimes
 
 FEW = 128  # entries up to which a dictionary counts faster than NumPy
@@ -101,6 +102,7 @@ class Rows:
         self._deleted: frozenset[int] = frozenset()
         self.arrivals = Arrivals()
         self.findings = SensorFindings()
+        self.start_news = StartNewsQueue()
         self.wrong_times = WrongTimes()
         self.recent = Recent(COUNTS)
         self.online_until = OnlineUntil()

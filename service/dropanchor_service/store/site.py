@@ -7,9 +7,11 @@ from threading import Lock
 
 from pydantic import BaseModel, ConfigDict
 
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Anchor, RemoteSettings, Site, TagSettings
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_service.runtime.recovery import Recovery, write_with_copy
+from dropanchor_service.store.floors import NO_FLOORS
 from dropanchor_service.store.groups import Groups, groups_of
 from dropanchor_service.store.preconditions import Precondition, always, require
 from dropanchor_service.store.shared import Save
@@ -34,11 +36,12 @@ class SiteStore:
     """The current site and tag settings, written by the API and the ingest thread, read by any thread.
 
     The ingest thread writes when it places the first anchor that a tag ranges to. `version` grows with every change,
-    so that one comparison detects a change. epoch: grows when another process of a cluster takes the site over; 0
-    without a cluster.
+    so that one comparison detects a change. floors: those of the plans. epoch: grows when another process of a cluster
+    takes the site over; 0 without a cluster.
     """
 
     epoch = 0
+    floors = NO_FLOORS
 
     def __init__(
         self,
@@ -154,7 +157,13 @@ class SiteStore:
         with self._lock:
             require(allows, self.site)
             if site.id != self.site.id:
-                raise ValueError(f"the site's id is {self.site.id!r} and cannot change while the service runs")
+                raise ValueError(
+                    say(
+                        "site_id",
+                        "the site's id is {site} and cannot change while the service runs",
+                        site=repr(self.site.id),
+                    )
+                )
             self._replace(self._document.model_copy(update={"site": site}))
 
     def anchor(self, anchor: str) -> Anchor | None:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from dropanchor_schemas.keys import chunk_from_id
+from dropanchor_schemas.sentences import say
 
 FRESH_NS = 10_000_000_000
 MAX_LOGGED = 64
@@ -75,5 +76,13 @@ def hint_about(name: str, hears_others: bool) -> str:
     hears_others: whether the tag ranges to anchors of the site, too.
     """
     if hears_others:
-        return f"Hears anchor {name}, which this site does not have: check its id, or add the anchor to the site."
-    return f"No anchor that it hears is part of this site: check the id of anchor {name}, or add it to the site."
+        return say(
+            "hears_unknown",
+            "Hears anchor {anchor}, which this site does not have: check its id, or add the anchor to the site.",
+            anchor=name,
+        )
+    return say(
+        "hears_only_unknown",
+        "No anchor that it hears is part of this site: check the id of anchor {anchor}, or add it to the site.",
+        anchor=name,
+    )

@@ -4,10 +4,17 @@ import logging
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.times import unit_of, why_not_utc
 
 FRESH_NS = 10_000_000_000
 MAX_LOGGED = 64
+
+_UNITS = {
+    "seconds": say("seconds", "seconds"),
+    "milliseconds": say("milliseconds", "milliseconds"),
+    "microseconds": say("microseconds", "microseconds"),
+}
 
 _log = logging.getLogger(__name__)
 
@@ -47,11 +54,15 @@ def hint_about_time(sent_ns: int) -> str:
     """Return what a person can do about a tag that sends such times."""
     unit = unit_of(sent_ns)
     if unit is not None:
-        return (
-            f"Its times (`t_ns`) look like {unit.name}, not nanoseconds: multiply them by {unit.ns}, or say clock boot "
-            "(flag bit 0) if they count from boot."
+        return say(
+            "time_in_unit",
+            "Its times (`t_ns`) look like {unit}, not nanoseconds: multiply them by {factor}, or say clock boot "
+            "(flag bit 0) if they count from boot.",
+            unit=_UNITS[unit.name],
+            factor=unit.ns,
         )
-    return (
+    return say(
+        "time_since_start",
         "Its times (`t_ns`) count from a start, such as boot, not from 1970: say clock boot (flag bit 0), or set its "
-        "clock."
+        "clock.",
     )

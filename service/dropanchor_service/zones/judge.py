@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.heights import p_between
 from dropanchor_service.zones.probability import p_inside
 
 ENTER_P: Final = 0.9  # of being inside
@@ -31,11 +32,14 @@ MODE = np.dtype([("weight", "f8"), ("x", "f8"), ("y", "f8"), ("cov", "f8", (2, 2
 
 
 class Poses(NamedTuple):
-    """Poses of tags, in columns. first: index of the first MODE of each pose, and the end."""
+    """Poses of tags, in columns. z, z_std: NaN where the height is not known. first: index of the first MODE of each
+    pose, and the end."""
 
     rows: Array
     t_ns: Array
     speeds: Array
+    z: Array
+    z_std: Array
     first: Array
     modes: Array
 
@@ -44,13 +48,15 @@ class Zones(NamedTuple):
     """Zones of one or several sites, in columns: those of one site after those of the other.
 
     vertices: n × 2, of one zone after the other. first: index of the first vertex of each zone, and the end. boxes:
-    (x min, y min, x max, y max). dwell_ns: -1: no rule. speed: m/s, infinite: no rule. sites: index of the first zone
-    of each site, and the end.
+    (x min, y min, x max, y max). low, high: of its heights, infinite: no end. dwell_ns: -1: no rule. speed: m/s,
+    infinite: no rule. sites: index of the first zone of each site, and the end.
     """
 
     vertices: Array
     first: Array
     boxes: Array
+    low: Array
+    high: Array
     delay_ns: Array
     dwell_ns: Array
     speed: Array
@@ -96,11 +102,25 @@ def judge(poses: Poses, zones: Zones, memory: Memory, begin: int, changes: Any) 
                 continue
             inside = 0.0 if is_far else _inside(modes, boxes[z], zones.vertices, zones.first[z], zones.first[z + 1])
             stay, before = memory.stays[row, column], count
-            count = _follow(stay, zones, z, inside, weight, now, continues, poses.speeds[i], changes, count)
+            inside, known = _at_height(inside, weight, poses.z[i], poses.z_std[i], zones.low[z], zones.high[z])
+            count = _follow(stay, zones, z, inside, known, now, continues, poses.speeds[i], changes, count)
             for k in range(before, count):
                 changes[k].pose, changes[k].zone = i, z
             memory.touched[row, column] = stay.flags != 0 or stay.pending_ns != 0
     return count, len(poses.rows)
+
+
+@njit(cache=True, nogil=True)
+def _at_height(inside: float, weight: float, z: float, std: float, low: float, high: float) -> tuple[float, float]:
+    """Return how much of the tag is in the zone with these heights, and of how much of it that is known.
+
+    inside: how much is in its area. A tag whose height is not known may be outside, but not inside.
+    """
+    if low == -np.inf and high == np.inf:
+        return inside, weight
+    if np.isnan(z):
+        return 0.0, weight - inside
+    return inside * p_between(z, std, low, high), weight
 
 
 @njit(cache=True, nogil=True)
@@ -118,7 +138,7 @@ def _follow(
 ) -> int:
     """Update the STAY of a tag in zone z, and add to `changes`. Return their new number.
 
-    inside: how much of the tag is in the zone, of its `weight`. continues: the last pose was shortly before.
+    inside: how much of the tag is in the zone, of the `weight` that is known. continues: the last pose was just before.
     """
     delay_ns = zones.delay_ns[z]
     if _turned(stay, inside, weight - inside, now, continues, delay_ns):

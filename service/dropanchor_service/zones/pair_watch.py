@@ -79,6 +79,10 @@ class PairWatch:
     def restore(self, pair: Pair, since_ns: int) -> None:
         self._close[pair] = since_ns
 
+    def forget(self, pair: Pair) -> None:
+        """Forget that a pair is too close."""
+        self._close.pop(pair, None)
+
     def judge(self, rows: Array, modes: Array, name_of: Callable[[int], str], now_ns: int) -> Iterator[PairChange]:
         """Judge the current places of all tags that have one, and yield what has changed.
 

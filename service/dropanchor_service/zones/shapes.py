@@ -7,6 +7,7 @@ import numpy as np
 import shapely
 from shapely.validation import explain_validity
 
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.zones import Circle, Polygon, Zone
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.zones.judge import Zones
@@ -27,8 +28,12 @@ def vertices_of(shape: Polygon | Circle) -> Array:
     polygon = shapely.Polygon(shape.points)
     if polygon.convex_hull.area < MIN_AREA_M2:
         raise ShapeError(
-            "the corners do not enclose an area: draw at least three corners that are not on one line, and "
-            f"{MIN_AREA_M2} m²"
+            say(
+                "no_area",
+                "the corners do not enclose an area: draw at least three corners that are not on one "
+                "line, and {area} m²",
+                area=MIN_AREA_M2,
+            )
         )
     if not polygon.is_valid:
         raise ShapeError(_advice(polygon))
@@ -48,11 +53,17 @@ def _advice(polygon: shapely.Polygon) -> str:
     reason = explain_validity(polygon)
     place = reason[reason.find("[") + 1 : reason.find("]")].replace(" ", ", ") if "[" in reason else "an edge"
     if reason.startswith(("Self-intersection", "Ring Self-intersection")):
-        return (
-            f"the edges cross or touch each other near ({place}): put the corners in the order of a walk around the "
-            "area, or draw two zones"
+        return say(
+            "edges_cross",
+            "the edges cross or touch each other near ({place}): put the corners in the order of a "
+            "walk around the area, or draw two zones",
+            place=place,
         )
-    return f"the polygon is not a simple area ({reason}): draw it again, without repeated corners"
+    return say(
+        "not_simple",
+        "the polygon is not a simple area ({reason}): draw it again, without repeated corners",
+        reason=reason,
+    )
 
 
 def table_of(zones: Sequence[Zone]) -> Zones:
@@ -63,6 +74,8 @@ def table_of(zones: Sequence[Zone]) -> Zones:
         np.concatenate([np.empty((0, 2)), *shapes]),
         np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
         np.array([[*shape.min(axis=0), *shape.max(axis=0)] for shape in shapes]).reshape(-1, 4),
+        np.array([-math.inf if zone.z_min_m is None else zone.z_min_m for zone in zones], np.float64),
+        np.array([math.inf if zone.z_max_m is None else zone.z_max_m for zone in zones], np.float64),
         np.array([zone.delay_s * 1e9 for zone in zones], np.int64),
         np.array([-1 if zone.dwell_s is None else zone.dwell_s * 1e9 for zone in zones], np.int64),
         np.array([math.inf if zone.speed_mps is None else zone.speed_mps for zone in zones], np.float64),
@@ -78,6 +91,8 @@ def joined(tables: Sequence[Zones]) -> Zones:
         np.concatenate([table.vertices for table in tables]),
         np.concatenate([*firsts, corners[-1:]]),
         np.concatenate([table.boxes for table in tables]),
+        np.concatenate([table.low for table in tables]),
+        np.concatenate([table.high for table in tables]),
         np.concatenate([table.delay_ns for table in tables]),
         np.concatenate([table.dwell_ns for table in tables]),
         np.concatenate([table.speed for table in tables]),

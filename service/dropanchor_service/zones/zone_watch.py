@@ -8,6 +8,7 @@ import numpy as np
 
 from dropanchor_schemas.zones import Zone
 from dropanchor_service.estimation.columns import Array
+from dropanchor_service.store.floors import is_height_known
 from dropanchor_service.store.groups import Groups
 from dropanchor_service.store.records import take
 from dropanchor_service.zones.concerned import concerned
@@ -127,6 +128,10 @@ class ZoneWatch:
         self._memory.stays[row, column], self._memory.touched[row, column] = np.zeros((), STAY), False
         return seen_ns
 
+    def restart_delays(self, row: int) -> None:
+        """Let every delay of a tag begin again with its next pose."""
+        self._memory.judged_ns[row] = 0
+
     def concerns(self, zone: str, row: int) -> bool:
         """Return whether this is one of the zones of the tag's site, and concerns the tag."""
         column = self._column(zone, row)
@@ -136,7 +141,8 @@ class ZoneWatch:
         """Judge new poses, and yield what has changed, per tag in order."""
         begin, found, (table, zones) = 0, placed.poses, self._joined()
         rows, t_ns, speeds = (np.ascontiguousarray(found[name]) for name in ("row", "t_ns", "speed"))
-        poses = Poses(rows, t_ns, speeds, placed.first, placed.modes)
+        z, z_std = np.where(is_height_known(found), found["z"], np.nan), np.ascontiguousarray(found["z_std"])
+        poses = Poses(rows, t_ns, speeds, z, z_std, placed.first, placed.modes)
         changes = np.zeros(max(MIN_ROOM, PER_PAIR * self._memory.stays.shape[1]), CHANGE)
         while zones and begin < len(found):
             count, begin = judge(poses, table, self._memory, begin, changes)

@@ -61,6 +61,14 @@ HEADING = Columns(
     may_be_nan=("yaw_rad",),
     interval_s=(2e-4, 5.0),
 )
+PRESSURE = Columns(
+    "pressure",
+    "pressures",
+    "t_s, pressure_pa, [temperature_c]: pressure of the air at the tag, Pa, and the temperature of that air, °C",
+    ("pressure_pa", "temperature_c"),
+    optional=("temperature_c",),
+    interval_s=(2e-3, 20.0),
+)
 TRUTH = Columns(
     "truth",
     "true poses",
@@ -69,7 +77,7 @@ TRUTH = Columns(
     may_be_nan=("z", "yaw_rad"),
     interval_s=(2e-4, 60.0),
 )
-FILES = (ANCHORS, RANGE, IMU, HEADING, TRUTH)
+FILES = (ANCHORS, RANGE, IMU, HEADING, PRESSURE, TRUTH)
 FORMATS = (".csv", ".csv.gz", ".jsonl", ".jsonl.gz", ".parquet")
 """Endings of the files, in the order in which they are looked for."""
 

@@ -3,7 +3,7 @@
 from array import array
 from pathlib import Path
 
-from dropanchor_tag_client.recording.columns import ANCHORS, HEADING, IMU, RANGE, TRUTH
+from dropanchor_tag_client.recording.columns import ANCHORS, HEADING, IMU, PRESSURE, RANGE, TRUTH
 from dropanchor_tag_client.recording.order import put_in_order
 from dropanchor_tag_client.recording.recording import Anchor, Recording, RecordingError
 from dropanchor_tag_client.recording.table import Table, read_table
@@ -15,21 +15,21 @@ FARTHEST_M = 1e8  # wider than any map projection
 def read_recording(folder: Path | str) -> Recording:
     """Return the recording in a folder. Raises RecordingError.
 
-    range and anchors are required; imu, heading and truth are optional. See `columns` for their columns. The times are
-    turned into seconds on the clock of the recording, in order.
+    range and anchors are required; imu, heading, pressure and truth are optional. See `columns` for their columns. The
+    times are turned into seconds on the clock of the recording, in order.
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise RecordingError(f"{folder} is not a folder; a recording is a folder with range.csv and anchors.csv")
     places = read_table(folder, ANCHORS)
     anchors = _anchors(places)
-    tables = [read_table(folder, file) for file in (RANGE, IMU, HEADING, TRUTH)]
-    ranges, imu, headings, truth = tables
+    tables = [read_table(folder, file) for file in (RANGE, IMU, HEADING, PRESSURE, TRUTH)]
+    ranges, imu, headings, pressures, truth = tables
     _check_anchors(ranges, anchors, places)
     notes = settle_units(tables)
     for table in tables:
         notes += put_in_order(table)
-    for table in (imu, headings):
+    for table in (imu, headings, pressures):
         _check_common_time(table, ranges)
     return Recording(
         name=folder.resolve().name,
@@ -38,6 +38,7 @@ def read_recording(folder: Path | str) -> Recording:
         ranges=_columns(ranges),
         imu=_columns(imu),
         headings=_columns(headings),
+        pressures=_columns(pressures),
         truth=_columns(truth),
         rows={table.file.name: table.rows for table in tables if len(table)},
         notes=tuple(notes),

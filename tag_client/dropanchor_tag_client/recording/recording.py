@@ -49,8 +49,8 @@ class Recording:
 
     ranges: t_s, range_m, std_m (NaN: unknown); `range_anchors` holds the anchor id of each range.
     imu: t_s, ax ay az, gx gy gz, mx my mz (NaN: no magnetometer). headings: t_s, yaw_rad, std_rad (NaN: unknown).
-    truth: t_s, x, y, z, yaw_rad.
-    rows: where the rows of each table come from, by its name (range, imu, heading, truth).
+    pressures: t_s, pressure_pa, temperature_c (NaN: unknown). truth: t_s, x, y, z, yaw_rad.
+    rows: where the rows of each table come from, by its name (range, imu, heading, pressure, truth).
     notes: sentences on what was done to the times.
     """
 
@@ -60,6 +60,7 @@ class Recording:
     ranges: dict[str, "array[float]"]
     imu: dict[str, "array[float]"] = field(default_factory=dict)
     headings: dict[str, "array[float]"] = field(default_factory=dict)
+    pressures: dict[str, "array[float]"] = field(default_factory=dict)
     truth: dict[str, "array[float]"] = field(default_factory=dict)
     rows: dict[str, Rows] = field(default_factory=dict)
     notes: tuple[str, ...] = ()

@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import Any, NamedTuple, Protocol
 
 from dropanchor_schemas.wire import Vector
+from dropanchor_tag_client.reminders import Reminders
 
 _BNO085_INTERVAL_US = 10_000
 _RETRY_S, _MAX_RETRY_S = 0.5, 5.0
@@ -141,14 +142,15 @@ class Readings:
 
     def _reopen(self) -> None:
         """Open the chip again until it answers."""
-        retry_s = _RETRY_S
+        retry_s, reminders = _RETRY_S, Reminders()
         while True:
             try:
                 self._chip = self._opened()
                 self._say("the chip answers again")
                 return
             except ChipError as error:
-                self._say(f"{error}. Still trying.")
+                if reminders.failed():
+                    self._say(f"{error}. {reminders.words}.")
             time.sleep(retry_s)
             retry_s = min(2 * retry_s, _MAX_RETRY_S)
 

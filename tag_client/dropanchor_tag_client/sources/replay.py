@@ -92,9 +92,10 @@ def replay(
 
 
 def timeline(recording: Recording, anchor: str | None = None) -> Iterator[Event]:
-    """Every sample of the recording in order of time, with what publishes it; headings before ranges of their time,
-    which may be the last of a message."""
-    return merge(_imu(recording), _headings(recording), _ranges(recording, anchor), key=itemgetter(0))
+    """Every sample of the recording in order of time, with what publishes it; ranges after the others of their time,
+    as they may be the last of a message."""
+    samples = (_imu(recording), _headings(recording), _pressures(recording), _ranges(recording, anchor))
+    return merge(*samples, key=itemgetter(0))
 
 
 def span(recording: Recording, anchor: str | None = None) -> tuple[float, float]:
@@ -140,6 +141,18 @@ def _headings(recording: Recording) -> Iterator[Event]:
 
 def _heading_sample(yaw_rad: float, std_rad: float) -> Publish:
     return lambda client, t_ns: client.publish_heading(yaw_rad, t_ns=t_ns, std_rad=std_rad)
+
+
+def _pressures(recording: Recording) -> Iterator[Event]:
+    columns = recording.pressures
+    if not columns:
+        return
+    for t_s, *values in zip(*(columns[name] for name in ("t_s", "pressure_pa", "temperature_c")), strict=True):
+        yield t_s, _pressure_sample(*values)
+
+
+def _pressure_sample(pressure_pa: float, temperature_c: float) -> Publish:
+    return lambda client, t_ns: client.publish_pressure(pressure_pa, t_ns=t_ns, temperature_c=temperature_c)
 
 
 def _behind(speed: float) -> float:

@@ -11,6 +11,7 @@ const IMU_SIZE = 40;
 const RANGE_SIZE = 16;
 const HEADING_SIZE = 12;
 const BEARING_SIZE = 16;
+const PRESSURE_SIZE = 12;
 const MAX_T_NS = 2n ** 62n;
 const NAN_BITS = 0x7fc00000;
 
@@ -47,6 +48,13 @@ export interface BearingSample {
   stdRad: number | null;
 }
 
+/** Pressure of the air, Pa and not hPa. temperatureC: of that air, °C, null when unknown. */
+export interface PressureSample {
+  tNs: bigint;
+  pressurePa: number;
+  temperatureC: number | null;
+}
+
 /** The samples of one message. Times are UTC, or since the start of the tag with bootClock. replay: of a recording. */
 export interface Frame {
   bootClock: boolean;
@@ -57,6 +65,7 @@ export interface Frame {
   ranges: readonly RangeSample[];
   headings: readonly HeadingSample[];
   bearings: readonly BearingSample[];
+  pressures?: readonly PressureSample[];
 }
 
 export type Reason =
@@ -82,9 +91,9 @@ export interface Rejection {
  * the payload would exceed MAX_PAYLOAD_BYTES.
  */
 export function encodePacked(frame: Frame): Uint8Array {
-  const { imu, ranges, headings, bearings } = frame;
-  const times = [imu, ranges, headings, bearings].flatMap((samples) => samples.map((sample) => sample.tNs));
-  const size = packedSize(imu.length, ranges.length, headings.length, bearings.length);
+  const { imu, ranges, headings, bearings, pressures = [] } = frame;
+  const times = [imu, ranges, headings, bearings, pressures].flatMap((samples) => samples.map((sample) => sample.tNs));
+  const size = packedSize(imu.length, ranges.length, headings.length, bearings.length, pressures.length);
   if (times.length === 0) throw new RangeError("a frame holds at least one sample");
   if (size > MAX_PAYLOAD_BYTES) throw new RangeError(`a payload has at most ${MAX_PAYLOAD_BYTES} bytes, not ${size}`);
   const t0Ns = times.reduce((a, b) => (b < a ? b : a));
@@ -97,6 +106,7 @@ export function encodePacked(frame: Frame): Uint8Array {
   for (const sample of ranges) writer.time(sample.tNs).u32(sample.anchor).floats(sample.rangeM, sample.stdM);
   for (const sample of headings) writer.time(sample.tNs).floats(sample.headingRad, sample.stdRad);
   for (const sample of bearings) writer.time(sample.tNs).u32(sample.anchor).floats(sample.bearingRad, sample.stdRad);
+  for (const sample of pressures) writer.time(sample.tNs).floats(sample.pressurePa, sample.temperatureC);
   return writer.bytes;
 }
 
@@ -106,7 +116,7 @@ export function decodePacked(payload: Uint8Array): Frame | Rejection {
   if (reason !== null) return { reason };
   const reader = new Reader(payload);
   const many = <Sample>(count: number, one: () => Sample): Sample[] => Array.from({ length: count }, one);
-  const [imu, ranges, headings, bearings] = counts(viewOf(payload));
+  const [imu, ranges, headings, bearings, pressures] = counts(viewOf(payload));
   return {
     bootClock: (viewOf(payload).getUint8(1) & BOOT_CLOCK) !== 0,
     replay: (viewOf(payload).getUint8(1) & REPLAY) !== 0,
@@ -126,6 +136,7 @@ export function decodePacked(payload: Uint8Array): Frame | Rejection {
       bearingRad: reader.float(),
       stdRad: reader.known(),
     })),
+    pressures: many(pressures, () => ({ tNs: reader.time(), pressurePa: reader.float(), temperatureC: reader.known() })),
   };
 }
 
@@ -134,8 +145,9 @@ export function isRejection(decoded: Frame | Rejection): decoded is Rejection {
 }
 
 /** Return the bytes of a packed payload with so many samples of each kind. */
-export function packedSize(imu: number, ranges: number, headings: number, bearings: number): number {
-  return HEADER_SIZE + IMU_SIZE * imu + RANGE_SIZE * ranges + HEADING_SIZE * headings + BEARING_SIZE * bearings;
+export function packedSize(imu: number, ranges: number, headings: number, bearings: number, pressures = 0): number {
+  const measured = RANGE_SIZE * ranges + HEADING_SIZE * headings + BEARING_SIZE * bearings;
+  return HEADER_SIZE + IMU_SIZE * imu + measured + PRESSURE_SIZE * pressures;
 }
 
 const NO_FIELD = [null, null, null] as const;
@@ -148,8 +160,9 @@ function viewOf(payload: Uint8Array): DataView {
   return new DataView(payload.buffer, payload.byteOffset, payload.byteLength);
 }
 
-function counts(view: DataView): [imu: number, ranges: number, headings: number, bearings: number] {
-  return [view.getUint16(2, true), view.getUint16(4, true), view.getUint16(6, true), view.getUint16(24, true)];
+function counts(view: DataView): [imu: number, ranges: number, headings: number, bearings: number, pressures: number] {
+  const count = (at: number): number => view.getUint16(at, true);
+  return [count(2), count(4), count(6), count(24), count(26)];
 }
 
 function refusal(payload: Uint8Array): Reason | null {
@@ -159,7 +172,7 @@ function refusal(payload: Uint8Array): Reason | null {
   if (view.getUint8(0) !== VERSION) return "version_unknown";
   if (payload.length < HEADER_SIZE) return "header_truncated";
   if ((view.getUint8(1) & ~(BOOT_CLOCK | REPLAY)) !== 0) return "flags_unknown";
-  if (view.getUint16(26, true) !== 0 || view.getUint32(28, true) !== 0) return "reserved_not_zero";
+  if (view.getUint32(28, true) !== 0) return "reserved_not_zero";
   if (payload.length !== packedSize(...counts(view))) return "length_mismatch";
   if (payload.length === HEADER_SIZE) return "no_samples";
   return view.getBigUint64(16, true) < MAX_T_NS ? null : "time_out_of_range";
@@ -185,6 +198,7 @@ class Writer {
     this.view.setUint32(12, frame.bootId, true);
     this.view.setBigInt64(16, this.t0Ns, true);
     this.view.setUint16(24, frame.bearings.length, true);
+    this.view.setUint16(26, frame.pressures?.length ?? 0, true);
   }
 
   time(tNs: bigint): this {

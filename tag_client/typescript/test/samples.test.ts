@@ -3,7 +3,7 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
 import { anchorNumber, decodePacked, encodePacked, isRejection, packedSize, tagKey } from "../src/index.js";
-import type { BearingSample, Frame, HeadingSample, ImuSample, RangeSample, Vector } from "../src/index.js";
+import type { BearingSample, Frame, HeadingSample, ImuSample, PressureSample, RangeSample, Vector } from "../src/index.js";
 
 type Golden = {
   frames: Record<string, { frame: GoldenFrame; packed: string }>;
@@ -18,6 +18,7 @@ type GoldenFrame = {
   range: { t_ns: string; anchor: number; range_m: number; std_m: number | null }[];
   heading: { t_ns: string; heading_rad: number; std_rad: number | null }[];
   bearing: { t_ns: string; anchor: number; bearing_rad: number; std_rad: number | null }[];
+  pressure: { t_ns: string; pressure_pa: number; temperature_c: number | null }[];
 };
 
 // From dist/test/, where this file is compiled to.
@@ -39,6 +40,9 @@ function frameOf(described: GoldenFrame): Frame {
     ),
     bearings: described.bearing.map(
       (s): BearingSample => ({ tNs: BigInt(s.t_ns), anchor: s.anchor, bearingRad: s.bearing_rad, stdRad: s.std_rad }),
+    ),
+    pressures: described.pressure.map(
+      (s): PressureSample => ({ tNs: BigInt(s.t_ns), pressurePa: s.pressure_pa, temperatureC: s.temperature_c }),
     ),
   };
 }

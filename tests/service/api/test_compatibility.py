@@ -108,6 +108,7 @@ HARMLESS: list[Change] = [
     lambda one: schema(one, "Zone")["properties"].update(colour=TEXT),
     lambda one: schema(one, "Zone")["properties"]["kind"]["enum"].append("line"),
     lambda one: schema(one, "ZoneRequest")["properties"]["kind"]["enum"].append("line"),
+    lambda one: schema(one, "ZoneRequest")["properties"].update(names={"type": "array", "items": TEXT}),
     lambda one: schema(one, "ZoneRequest")["required"].remove("id"),
     lambda one: schema(one, "Zone")["properties"]["size"]["anyOf"].pop(),
     lambda one: schema(one, "Zone")["properties"]["size"]["anyOf"][0].update(type="integer"),

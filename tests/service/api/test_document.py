@@ -4,10 +4,8 @@ from typing import Any
 
 import pytest
 
-from support.api import make_api_bench
+from support.interface_document import DOCUMENT, SCHEMAS
 
-DOCUMENT: dict[str, Any] = make_api_bench().app().openapi()
-SCHEMAS = DOCUMENT["components"]["schemas"]
 OPERATIONS = {operation["operationId"]: operation for item in DOCUMENT["paths"].values() for operation in item.values()}
 BINARY = (
     "application/octet-stream",

@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 from pmtiles.tile import Compression, Entry, TileType, deserialize_header, serialize_directory, serialize_header
 
+from dropanchor_service.basemap.errors import UnreadableTileError, UnusableFileError
 from dropanchor_service.basemap.file import (
     MAX_DIRECTORY_BYTES,
     MAX_TILE_BYTES,
     TileFile,
-    UnreadableTileError,
-    UnusableFileError,
 )
 from support.basemap_files import basemap_file, image_tile
 

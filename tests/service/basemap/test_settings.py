@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from dropanchor_schemas.site import Georeference, Site
-from dropanchor_service.basemap.file import UnreadableTileError
+from dropanchor_service.basemap.errors import UnreadableTileError
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.persistence.site_folders import SiteFolders
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
-from dropanchor_service.site_folders import SiteFolders
 from dropanchor_service.store import Sites, SiteStore
 from support.basemap_files import basemap_file, image_tile
 

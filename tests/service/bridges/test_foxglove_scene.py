@@ -1,11 +1,12 @@
 """What is drawn of poses that are unknown, ambiguous, or not in the site's frame."""
 
+import struct
 from math import hypot, pi
 from typing import Any
 
 import pytest
 
-from dropanchor_service.bridges.foxglove_scene import ellipse_points, pose_in_frame, scene, transforms
+from dropanchor_service.bridges.foxglove_scene import ellipse_points, location_fixes, pose_in_frame, scene, transforms
 from dropanchor_service.bridges.frames import frame_id, in_its_frame
 
 ELLIPSE = {"semi_major_m": 2.0, "semi_minor_m": 1.0, "angle_rad": pi / 2}
@@ -26,6 +27,11 @@ def test_the_major_axis_of_an_ellipse_points_to_its_angle() -> None:
 def test_a_tag_without_a_position_is_not_drawn() -> None:
     assert b"S\xc3\xbcd" not in scene([pose()], [], {}, 0).encode()
     assert transforms([pose()], [], {}, 0).encode() == b""
+
+
+def test_a_location_has_the_altitude_of_the_pose() -> None:
+    found = [location_fixes([pose(lat=52.5, lon=13.4, alt_m=alt_m)]).encode() for alt_m in (37.75, None)]
+    assert [struct.pack("<d", 37.75) in message for message in found] == [True, False]
 
 
 def test_hypotheses_are_drawn_before_there_is_a_position() -> None:

@@ -1,7 +1,7 @@
 """ROS messages against a reader and a writer of CDR that were written apart from them."""
 
 from contextlib import suppress
-from math import isnan, pi
+from math import isnan, nan, pi
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,21 @@ from hypothesis import strategies as st
 
 from dropanchor_service.bridges.rmw_zenoh import NO_TYPE_HASH
 from dropanchor_service.bridges.ros_messages import RosMessages, UnusableError, is_usable
-from support.ros2 import HEADER, IMU, ODOMETRY, POSE, RANGE, TF, CdrReader, CdrWriter, imu_cdr, range_cdr, read_pose
+from support.ros2 import (
+    HEADER,
+    IMU,
+    ODOMETRY,
+    POSE,
+    PRESSURE,
+    RANGE,
+    TF,
+    CdrReader,
+    CdrWriter,
+    imu_cdr,
+    pressure_cdr,
+    range_cdr,
+    read_pose,
+)
 
 T_NS = 1_800_000_000_123_456_789
 COVARIANCE = [[0.1, 0.02, 0.03], [0.02, 0.4, 0.05], [0.03, 0.05, 0.6]]
@@ -24,8 +38,8 @@ def pose(**fields: Any) -> dict[str, Any]:
 
 
 def test_the_types_have_the_names_and_hashes_of_ros_2_jazzy() -> None:
-    types = (MESSAGES.imu, MESSAGES.range, MESSAGES.pose, MESSAGES.odometry, MESSAGES.tf)
-    assert [f"{of.dds_name}/{of.type_hash}" for of in types] == [IMU, RANGE, POSE, ODOMETRY, TF]
+    types = (MESSAGES.imu, MESSAGES.range, MESSAGES.pressure, MESSAGES.pose, MESSAGES.odometry, MESSAGES.tf)
+    assert [f"{of.dds_name}/{of.type_hash}" for of in types] == [IMU, RANGE, PRESSURE, POSE, ODOMETRY, TF]
 
 
 def test_a_pose_has_the_covariance_of_x_y_and_yaw_in_their_places() -> None:
@@ -39,6 +53,14 @@ def test_a_pose_has_the_covariance_of_x_y_and_yaw_in_their_places() -> None:
     np.testing.assert_array_equal(matrix[np.ix_([0, 1, 5], [0, 1, 5])], COVARIANCE)
     np.testing.assert_array_equal(matrix[2:5, 2:5], np.diag([1e6, 1e6, 1e6]))
     assert not matrix[np.ix_([0, 1, 5], [2, 3, 4])].any()
+
+
+def test_a_height_that_was_measured_has_a_variance_and_one_that_was_told_has_none() -> None:
+    for source, variance in (("pressure", 0.0625), ("told", 1e6), ("unknown", 1e6)):
+        reader = CdrReader(MESSAGES.pose_cdr(pose(z=6.5, z_std_m=0.25, z_source=source), 6.5))
+        reader.stamp_and_frame()
+        place, _, covariance = read_pose(reader)
+        assert (place[2], covariance[2 * 6 + 2]) == (6.5, variance)
 
 
 def test_odometry_moves_in_the_frame_of_the_tag() -> None:
@@ -110,3 +132,11 @@ def test_messages_of_humble_are_read_without_the_variance_that_it_does_not_have(
 def test_an_imu_message_without_a_measurement_is_named(cdr: bytes, type_hash: str, why: str) -> None:
     with pytest.raises(UnusableError, match=why):
         MESSAGES.imu_sample(cdr, T_NS, type_hash)
+
+
+@pytest.mark.parametrize("type_hash", [MESSAGES.pressure.type_hash, NO_TYPE_HASH], ids=["Jazzy", "Humble"])
+def test_a_barometer_gives_pascals(type_hash: str) -> None:
+    sample = MESSAGES.pressure_sample(pressure_cdr(T_NS, 101_325.0), 5, type_hash)
+    assert sample[:2] == (T_NS, 101_325.0)
+    with pytest.raises(UnusableError, match="a pressure that is not finite"):
+        MESSAGES.pressure_sample(pressure_cdr(T_NS, nan), 5, type_hash)

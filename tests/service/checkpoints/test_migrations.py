@@ -19,7 +19,7 @@ from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from support.golden_checkpoint import Drive, golden, halves
 
 EARLIER = f"{layouts.VERSION - 1}-{'0' * 16}"
-LAYOUT = "6-237d0b17fd014d18"
+LAYOUT = "7-28fc62867ebe7bd0"
 READ = range(layouts.VERSION - layouts.READ_BEFORE, layouts.VERSION)
 
 
@@ -67,6 +67,13 @@ def test_a_service_goes_on_from_each_layout_that_it_reads(version: int, uninterr
         assert after[name][tracking] == pytest.approx(uninterrupted[name][tracking], abs=within)
     assert sum(tag.messages for tag in drive.bench.tags.all()) == before.arrays["counts"]["messages"].sum() + len(rest)
     assert drive.bench.rejected() == {}
+
+
+def test_messages_stand_behind_the_kinds_of_whichever_number(tmp_path: Path) -> None:
+    before = decoded(golden(layouts.VERSION - 1))[1]
+    before.arrays["counts"]["screened"] = np.arange(5)
+    after = Drive(tmp_path).state.decoded(b"".join(encoded(before, EARLIER))).arrays["counts"]["screened"]
+    assert after.tolist() == [[0, 1, 2, 3, 0, 4]] * 3
 
 
 def earlier(present: Snapshot) -> Snapshot:

@@ -9,6 +9,7 @@ import pytest
 from dropanchor_service.commands.lan import own_addresses, urls_for_others
 from service.commands.test_key import scanned
 from support.kernel_cache import compile_once
+from support.patience import PATIENCE_S
 from support.service import command, environment
 from support.zenoh_router import free_endpoint
 
@@ -45,5 +46,5 @@ def test_the_terminal_shows_a_code_that_leads_to_the_page() -> None:
             assert scanned(printed) == first
         finally:
             process.terminate()
-            assert process.wait(60) == 0
+            assert process.wait(PATIENCE_S) == 0
             os.close(terminal)

@@ -84,7 +84,7 @@ def test_unusable_input_is_an_error_with_exit_code_2(
 
 
 @pytest.mark.parametrize("lag", [[], ["--lag"]])
-def test_smoothed_poses_have_the_same_columns_and_a_report(
+def test_smoothed_poses_have_a_report_and_a_column_that_says_which_are_smoothed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], lag: list[str]
 ) -> None:
     folder, filtered, smoothed = write_square(tmp_path, 0.05), tmp_path / "filtered.csv", tmp_path / "smoothed.csv"
@@ -92,10 +92,17 @@ def test_smoothed_poses_have_the_same_columns_and_a_report(
     assert call(folder, *options, "--out", filtered) == 0
     before = float(capsys.readouterr().out.split("RMSE ")[1].split()[0])
     assert call(folder, *options, "--smooth", *lag, "--out", smoothed) == 0
-    after = float(capsys.readouterr().out.split("RMSE ")[1].split()[0])
+    said = capsys.readouterr().out
+    after = float(said.split("RMSE ")[1].split()[0])
     assert after < (2.0 if lag else before)  # a single run with a lag need not be better than the filter
     assert [row["t_s"] for row in rows(smoothed)] == [row["t_s"] for row in rows(filtered)]
-    assert list(rows(smoothed)[0]) == list(replay.COLUMNS)
+    assert list(rows(smoothed)[0]) == [*replay.COLUMNS, "source"]
+    sources = [row.pop("source") for row in rows(smoothed)]
+    assert f"smoothed: {sources.count('smoothed') / len(sources):.1%} of the poses" in said
+    as_filtered = [source == "filtered" for source in sources]
+    assert 0 < sum(as_filtered) < len(sources)
+    for is_filtered, one, other in zip(as_filtered, rows(smoothed), rows(filtered), strict=True):
+        assert not is_filtered or one == {**other, "source": "filtered"}
 
 
 @pytest.mark.parametrize("lag", ["-1", "61", "nan", "soon"])

@@ -14,8 +14,8 @@ import pytest
 
 from dropanchor_service.commands.replay_report import report, score_of
 from dropanchor_service.estimation.columns import POSE, Frame, SampleBatch, State
-from dropanchor_service.evaluation.accuracy import Truth
-from dropanchor_service.evaluation.replay import Samples, Track
+from dropanchor_service.offline.accuracy import Truth
+from dropanchor_service.offline.replay import Samples, Track
 from service.commands.replays import call, read_rows
 from support.commands import environment
 from support.recordings import write_square

@@ -12,6 +12,7 @@ import pytest
 from dropanchor_service.cli import main
 from dropanchor_service.security.folder import SecurityFolder
 from support.commands import environment
+from support.patience import PATIENCE_S
 from support.secured import secured_site
 from support.service import command
 from support.zenoh_router import free_port, wait_until
@@ -26,7 +27,7 @@ def router(folder: Path, log: Path, *options: str) -> Iterator[subprocess.Popen[
         yield process
     finally:
         process.terminate()
-        process.wait(60)
+        process.wait(PATIENCE_S)
 
 
 def changed(file: Path, **sections: Any) -> None:

@@ -23,7 +23,7 @@ def alert_place(email: EmailSettings | None = None) -> ZonePlace:
     """Return a place with a zone that watches how long tags stay, and a mail server in its settings."""
     place = zone_place()
     email = email or EmailSettings(server="127.0.0.1", port=1, tls="none")
-    delivery = DeliverySettings(allow_networks=(ipaddress.ip_network("127.0.0.0/8"),), timeout_s=2.0)
+    delivery = DeliverySettings(allow_networks=(ipaddress.ip_network("127.0.0.0/8"),), timeout_s=60.0)
     destinations = place.parts.destinations
     store = EventStore(Database(None), "yard", lambda draft: addressees(destinations, draft))
     place.parts = replace(

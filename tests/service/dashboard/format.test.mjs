@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import {
-  age, compass, coordinate, distance, fixed, length, percent, sigma, tagCount, turnRate, words,
+  age, compass, coordinate, distance, fixed, half, height, length, percent, tagCount, turnRate, words,
 } from "../../../service/dropanchor_service/dashboard/data/format.js";
 
 /** @param {(value: any) => string} format @param {[any, string][]} cases */
@@ -11,7 +11,7 @@ function gives(format, cases) {
 }
 
 test("every unknown value is a dash", () => {
-  for (const format of [age, compass, coordinate, length, percent, sigma, turnRate]) {
+  for (const format of [age, compass, coordinate, half, length, percent, turnRate]) {
     gives(format, [[NaN, "–"], [null, "–"], [undefined, "–"], [Infinity, "–"]]);
   }
 });
@@ -51,4 +51,11 @@ test("a count of one has a singular noun", () => {
   assert.equal(tagCount(1), "1 tag");
   assert.equal(tagCount(12000), "12,000 tags");
   assert.equal(words("several_modes"), "several modes");
+});
+
+test("a height says where it comes from", () => {
+  assert.equal(height(1.1, 0.15, "told"), "1.10 m, as told");
+  assert.equal(height(11.234, 0.321, "pressure"), "11.23 m ± 0.32 m, from pressure");
+  assert.equal(height(1.1, 10, "unknown"), "unknown: no pressures");
+  assert.equal(height(NaN, NaN, null), "–");
 });

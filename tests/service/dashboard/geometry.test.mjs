@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { distancesTo, horizontal } from "../../../service/dropanchor_service/dashboard/map/geometry.js";
+import { distancesTo, horizontal, reachOf } from "../../../service/dropanchor_service/dashboard/map/geometry.js";
 
 const square = { left: 0, right: 4, bottom: 0, top: 3 };
 
@@ -21,4 +21,12 @@ test("a slant range is longer than the horizontal distance", () => {
 
 test("a range shorter than the height gives distance zero", () => {
   assert.equal(horizontal(2, 3), 0);
+});
+
+test("an ellipse reaches as far as its axes tell", () => {
+  const close = (/** @type {number[]} */ found, /** @type {number[]} */ wanted) => found.forEach((value, i) => assert.ok(Math.abs(value - wanted[i]) < 1e-9, `${found}`));
+  close(reachOf(3, 1, 0), [3, 1]);
+  close(reachOf(3, 1, Math.PI / 2), [1, 3]);
+  close(reachOf(3, 3, 0.7), [3, 3]);
+  close(reachOf(NaN, NaN, 0), [0, 0]);
 });

@@ -79,7 +79,7 @@ function sceneOf(age_s, /** @type {Record<string, string>} */ colours) {
   const view = Object.assign(new View(), { x: 0, y: 0, scale: 10, width: 400, height: 400 });
   const rows = Int32Array.from(states, (_, i) => i);
   const ctx = new NotedCanvas();
-  return /** @type {any} */ ({ ctx, view, palette: paletteOf(colours), fleet, rows, selected: 0, hovered: 1, now_ms: 0 });
+  return /** @type {any} */ ({ ctx, view, palette: paletteOf(colours), fleet, rows, selected: 0, chosen: [0], hovered: 1, now_ms: 0 });
 }
 
 for (const [theme, colours] of Object.entries({ light, dark })) {
@@ -110,3 +110,15 @@ for (const [theme, colours] of Object.entries({ light, dark })) {
     }
   });
 }
+
+test("in a crowd only the selected tag has an ellipse with a halo and a fill; the others are thin and faint", () => {
+  const scene = sceneOf(0, light);
+  scene.rows = Int32Array.from({ length: 40 }, (_, i) => (i === 0 ? 2 : 3)); // rows of tags with an ellipse
+  [scene.selected, scene.chosen] = [2, [2]];
+  drawEllipses(scene);
+  const { painted } = scene.ctx;
+  const halos = painted.filter((/** @type {any} */ { colour }) => colour === light.map);
+  const faint = painted.filter((/** @type {any} */ { kind, width, alpha }) => kind === "line" && width === 1 && alpha < 0.5);
+  assert.equal(halos.length, 1);
+  assert.ok(faint.length >= 1 && faint.every((/** @type {any} */ { path }) => path !== halos[0].path));
+});

@@ -72,14 +72,13 @@ test("floors are listed from the top, and plans of one floor are joined", () => 
   assert.deepEqual(floors[1].ranges, [[-1, 3], [3.5, 4]]);
 });
 
-test("a tag is elsewhere only if its height is known to be on another floor", () => {
-  const [upper, lower] = floorsOf([onFloor("0", -1, 3), onFloor("1", 3, 6)]);
-  assert.equal(isElsewhere([upper, lower], lower, 4), true);
-  assert.equal(isElsewhere([upper, lower], lower, 3), true);
-  assert.equal(isElsewhere([upper, lower], upper, 3), false);
-  assert.equal(isElsewhere([upper, lower], upper, 0), false); // not set
-  assert.equal(isElsewhere([upper, lower], upper, 50), false); // on no floor
-  assert.equal(isElsewhere([lower], null, 4), false);
+test("a tag is elsewhere unless it is on the chosen floor with a probability above 0.9, or on no known floor", () => {
+  const [upper] = floorsOf([onFloor("0", -1, 3), onFloor("1", 3, 6)]);
+  assert.equal(isElsewhere(upper, "0", 0.99), true);
+  assert.equal(isElsewhere(upper, "1", 0.91), false);
+  assert.equal(isElsewhere(upper, "1", 0.9), true);
+  assert.equal(isElsewhere(upper, null, NaN), false); // its height is not known, or on no floor
+  assert.equal(isElsewhere(null, "0", 0.99), false);
 });
 
 test("a world file is known by its name and must hold six numbers", async () => {

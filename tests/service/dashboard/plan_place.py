@@ -9,6 +9,7 @@ from typing import Any
 from dropanchor_schemas.plans import Floor, Placement, Plan
 from dropanchor_schemas.site import Site
 from dropanchor_service.api.app import DASHBOARD
+from dropanchor_service.plans.floors import follow_floors
 from dropanchor_service.plans.reading.file_types import file_type_of
 from dropanchor_service.plans.reading.messages import Request
 from dropanchor_service.plans.reading.read_plan import read_plan
@@ -38,6 +39,7 @@ def plan_place(
 ) -> Iterator[PlanPlace]:
     """Serve a page until the block ends."""
     bench, plans = live_api_bench(site), PlanStore(folder)
+    follow_floors(plans, bench.answers.site)
     app = bench.app(DASHBOARD, plans=plans, authenticator=authenticator)
     with running_server(app, bench.stopping) as port:
         yield PlanPlace(bench, f"http://127.0.0.1:{port}/", plans)

@@ -15,7 +15,7 @@ function points(columns = {}, length = 4) {
   const column = (/** @type {(i: number) => any} */ value) => Array.from({ length }, (_, i) => value(i));
   return {
     t_ns: column((i) => i * 1e9), state: column(() => "tracking"), frame: column(() => "site"), x: column((i) => i),
-    y: column(() => 5), heading_rad: column(() => 0), speed_mps: column(() => 1), sigma_pos_m: column(() => 0.2),
+    y: column(() => 5), z: column((i) => 3 * i), z_std_m: column((i) => 0.1 + i), z_source: column(() => "pressure"), floor: column(() => "0"), floor_probability: column(() => 1), heading_rad: column(() => 0), speed_mps: column(() => 1), sigma_pos_m: column(() => 0.2),
     semi_major_m: column((i) => 1 + i), semi_minor_m: column(() => 1), angle_rad: column(() => 0),
     since_previous: column((i) => (i === 0 ? "unknown" : "tracking")), ...columns,
   };
@@ -34,6 +34,20 @@ function poseAt(columns, time_ms) {
 test("between two points of a known way the tag is between them, with the larger ellipse and no age", () => {
   const pose = poseAt({}, 1500);
   assert.deepEqual([pose.x, pose.y, pose.semi_major_m, pose.age_s, pose.state], [1.5, 5, 3, 0, "tracking"]);
+});
+
+test("the height of a tag is between two points, and as uncertain as when it changed", () => {
+  const pose = poseAt({ z_std_m: [0, 0, 0, 0] }, 1500);
+  assert.deepEqual([pose.z, pose.z_std_m, pose.z_source], [4.5, 1.5, "pressure"]);
+  const before = poseAt({ z: [null, null, null, null], z_source: [null, null, null, null] }, 1500);
+  assert.deepEqual([Number.isNaN(before.z), before.z_source], [true, null]);
+});
+
+test("between two points on different floors neither of them is sure", () => {
+  const lift = { floor: ["0", "0", "1", "1"] };
+  assert.deepEqual([poseAt(lift, 500).floor, poseAt(lift, 500).floor_probability], ["0", 1]);
+  assert.deepEqual([poseAt(lift, 1250).floor, poseAt(lift, 1250).floor_probability], ["0", 0.75]);
+  assert.deepEqual([poseAt(lift, 1750).floor, poseAt(lift, 1750).floor_probability], ["1", 0.75]);
 });
 
 test("before its first point a tag is not in the frame", () => {

@@ -4,6 +4,7 @@ import { test } from "node:test";
 import { countCells } from "../../../service/dropanchor_service/dashboard/map/density.js";
 import { Fleet } from "../../../service/dropanchor_service/dashboard/data/fleet.js";
 import { follow } from "../../../service/dropanchor_service/dashboard/data/motion.js";
+import { sideOf, tagsOutside } from "../../../service/dropanchor_service/dashboard/map/outside.js";
 import { alike, nearest, rowsInView } from "../../../service/dropanchor_service/dashboard/map/scene.js";
 import { View } from "../../../service/dropanchor_service/dashboard/map/view.js";
 
@@ -53,4 +54,13 @@ test("every visible tag counts in one cell, and doubtful ones count separately",
 test("an old pose is doubtful", () => {
   const cells = countCells(scene(fleetAt([[0, 0]]), 60_000));
   assert.deepEqual([...cells.doubtful].filter(Boolean), [1]);
+});
+
+test("tags outside the view are counted by side, without hidden ones and those with an unknown position", () => {
+  const fleet = fleetAt([[0, 0], [-30, 5], [-40, 0], [25, 90], [NaN, 0], [22, -21]]);
+  const groups = tagsOutside(fleet, view.bounds(), (row) => row !== 5);
+  assert.deepEqual([...groups].map(([side, { count }]) => [side, count]), [["left", 2], ["up", 1]]);
+  assert.deepEqual(groups.get("left")?.bounds, { left: -40, right: -30, bottom: 0, top: 5 });
+  assert.equal(sideOf(22, -21, view.bounds()), "right");
+  assert.equal(sideOf(21, -22, view.bounds()), "down");
 });

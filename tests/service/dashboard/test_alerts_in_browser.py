@@ -1,5 +1,6 @@
 """Destinations and rules are made, edited, tested and deleted on the page."""
 
+import ipaddress
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ from playwright.sync_api import Browser, Locator, expect
 
 from dropanchor_schemas.destinations import EmailDestination, WebhookDestination
 from dropanchor_schemas.zones import BatteryLowRule, TooCloseRule
+from dropanchor_service.delivery.signature import key_of
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
 from dropanchor_service.settings.events import EmailSettings
@@ -63,34 +65,73 @@ def test_an_e_mail_is_made_tested_edited_and_deleted(chromium: Browser) -> None:
         form.get_by_role("button", name="Delete…").click()
         page.page.get_by_role("button", name="Delete destination").click()
         expect(alerts.get_by_role("button", name="Edit early-shift")).to_be_hidden()
-        expect(alerts).to_contain_text("Events go to nobody yet.")
+        page.page.reload()  # the time to undo is over with the page
+        expect(alerts.locator("summary")).to_contain_text("nobody is told yet")
         assert page.errors == []
     assert not place.parts.destinations.all
 
 
-def test_a_webhook_keeps_its_secret_and_a_refused_one_says_why(chromium: Browser) -> None:
-    place = alert_place()
+def test_a_webhook_needs_no_terminal_its_secret_is_made_and_its_network_allowed_where_it_is_refused(
+    chromium: Browser,
+) -> None:
+    place = alert_place(EmailSettings())
     with served(place), watched_page(chromium, place.url) as page:
+        page.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
         alerts = opened(page)
+        alerts.get_by_role("button", name="New e-mail").click()
+        expect(alerts.get_by_role("alert")).to_contain_text("An e-mail needs a mail server")
+        expect(alerts.get_by_role("form", name="Destination", exact=True)).to_be_hidden()
         alerts.get_by_role("button", name="New webhook").click()
         form = alerts.get_by_role("form", name="Destination", exact=True)
         form.get_by_label("Name").fill("mes")
         form.get_by_label("URL").fill("http://10.0.0.1/events")
-        form.get_by_label("Secret").fill(SECRET)
+        secret = form.get_by_role("textbox", name="Secret").input_value()
+        key_of(secret)
+        form.get_by_role("button", name="Copy").click()
+        assert page.page.evaluate("navigator.clipboard.readText()") == secret
+        form.get_by_role("button", name="New secret").click()
+        assert form.get_by_role("textbox", name="Secret").input_value() != secret
+        form.get_by_role("textbox", name="Secret").fill("")
+        expect(form.get_by_role("button", name="Copy")).to_be_hidden()
+        assert is_marked(form.get_by_role("textbox", name="Secret"))
+        assert is_marked(form.get_by_label("URL"))
+        assert not is_marked(form.get_by_role("textbox", name="Tags"))
+        form.get_by_role("textbox", name="Secret").fill(SECRET)
         form.get_by_role("button", name="Save destination").click()
-        expect(form.get_by_role("alert")).to_contain_text("allow_networks")
-        expect(form.get_by_label("Secret")).to_have_value(SECRET)
-        form.get_by_label("URL").fill("http://127.0.0.1:9/events")
-        form.get_by_role("button", name="Save destination").click()
+        expect(form.get_by_role("alert")).to_have_text(
+            "This receiver is inside, in 10.0.0.0/24, where events may not go yet."
+        )
+        expect(form.get_by_role("textbox", name="Secret")).to_have_value(SECRET)
+        form.get_by_role("button", name="Allow 10.0.0.0/24").click()
         expect(form).to_be_hidden()
+        networks = alerts.get_by_role("list", name="Receivers inside")
+        expect(networks).to_contain_text("127.0.0.0/8in the settings10.0.0.0/24")
+        kept = place.parts.destinations.all["mes"]
+        assert isinstance(kept, WebhookDestination)
+        assert (kept.secret, kept.url) == (SECRET, "http://10.0.0.1/events")
         alerts.get_by_role("button", name="Edit mes").click()
-        expect(form.get_by_label("Secret")).to_have_value("")
+        expect(form.get_by_role("textbox", name="Secret")).to_have_value("")
+        assert not is_marked(form.get_by_role("textbox", name="Secret"))
+        expect(form).to_contain_text("The present one stays, and cannot be shown.")
         form.get_by_role("textbox", name="Tags").fill("cart-3")
         form.get_by_role("button", name="Save destination").click()
         expect(form).to_be_hidden()
         kept = place.parts.destinations.all["mes"]
         assert isinstance(kept, WebhookDestination)
         assert (kept.secret, kept.tags) == (SECRET, ["cart-3"])
+        alerts.get_by_label("Network", exact=True).fill("169.254.0.0/16")
+        alerts.get_by_role("button", name="Allow network").click()
+        expect(alerts.get_by_role("alert")).to_contain_text("169.254.0.0/16 is not private")
+        alerts.get_by_role("button", name="Remove 10.0.0.0/24").click()
+        expect(networks.get_by_text("10.0.0.0/24")).to_be_hidden()
+        assert list(place.parts.channels.networks) == [ipaddress.ip_network("127.0.0.0/8")]
+
+
+def is_marked(field: Locator) -> bool:
+    """Return whether a field is said to be needed, to the eye and by a screen reader."""
+    marked = field.evaluate("field => getComputedStyle(field.closest('label'), '::before').content.includes('*')")
+    assert field.evaluate("field => field.required") == marked
+    return bool(marked)
 
 
 def test_dead_letters_are_shown_sent_again_and_dropped(chromium: Browser) -> None:

@@ -137,7 +137,7 @@ def _check_the_switch(page: WatchedPage, place: Place, chromium: Browser) -> Non
         assert right > 0.9 * of_all
         assert "basemap" not in copied.page.url
     place.bench.answers.site.set_site(place.bench.answers.site.site.model_copy(update={"georeference": None}))
-    expect(button).to_be_hidden(timeout=15_000)
+    expect(button).to_be_hidden()
 
 
 def test_a_road_of_a_vector_tile_lies_right_in_light_and_dark(chromium: Browser, tmp_path: Path) -> None:

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from support.patience import PATIENCE_S
+
 HERE = Path(__file__).parent
 
 
@@ -14,5 +16,5 @@ def test_the_unit_tests_of_a_module_pass(file: Path) -> None:
     node = shutil.which("node")
     if node is None:
         pytest.skip("node is not installed: the unit tests of the page's modules need it (the page itself does not)")
-    run = subprocess.run([node, "--test", str(file)], capture_output=True, text=True, timeout=60, check=False)
+    run = subprocess.run([node, "--test", str(file)], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert run.returncode == 0, run.stdout + run.stderr

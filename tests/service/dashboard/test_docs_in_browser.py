@@ -11,8 +11,9 @@ pytestmark = pytest.mark.browser
 
 def test_an_operation_can_be_tried_without_another_server(chromium: Browser, place: Place) -> None:
     place.move("cart", x=1.0, y=2.0)
-    with open_page(chromium, f"{place.url}docs", size=(1280, 1600)) as page:
+    with open_page(chromium, f"{place.url}docs", size=(1280, 800)) as page:
         operation = page.page.locator("#operations-poses-get_pose")
+        expect(operation).to_be_in_viewport()
         operation.locator(".opblock-summary-control").click()
         operation.get_by_role("button", name="Try it out").click()
         operation.get_by_placeholder("tag").fill("cart")

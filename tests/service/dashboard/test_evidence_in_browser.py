@@ -50,6 +50,7 @@ def drive(place: Place, tag: str = "cart", hard_gate: bool = False) -> Array:
     innovations["measured"] = np.add(innovations["predicted"], innovations["innovation"])
     innovations["S"] = 0.1**2
     innovations["fused"] = [i not in REFUSED for i in range(COUNT)]
+    innovations["white_std"], innovations["lasting_std"] = (np.nan, np.nan) if hard_gate else (0.3, 0.4)
     innovations["p_outlier"] = np.nan if hard_gate else ~innovations["fused"]
     poses["anchor"], poses["range"] = innovations["anchor"], innovations["measured"]
     for i in range(COUNT):
@@ -142,6 +143,17 @@ def test_the_innovations_of_an_engine_with_a_hard_gate_are_shown_too(chromium: B
         select(page)
         assert len(marks(page, "range", "refused")) == len(REFUSED)
         assert page.errors == []
+
+
+def test_the_page_says_how_much_ranges_scatter_where_the_engine_learns_it(chromium: Browser, place: Place) -> None:
+    with watched_page(chromium, place.url) as page:
+        drive(place)
+        drive(place, "van", hard_gate=True)
+        select(page)
+        scatter = page.page.locator("[data-text='scatter']")
+        assert scatter.text_content() == "Its ranges scatter by 0.50 m, of which 0.40 m last for seconds"
+        select(page, "van")
+        page.page.wait_for_function("() => document.querySelector('[data-text=scatter]').textContent === ''")
 
 
 def test_a_tag_without_innovations_has_no_plots(chromium: Browser, place: Place) -> None:

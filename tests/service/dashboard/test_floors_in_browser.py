@@ -6,7 +6,6 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 from dropanchor_schemas.plans import Floor
-from dropanchor_schemas.site import TagSettings
 from service.dashboard.plan_place import PlanPlace, plan_place
 from service.dashboard.test_plans_in_browser import edit, open_panel
 from support.browser import watched_page
@@ -28,11 +27,9 @@ GROUND, UPPER = Floor(name="Ground", bottom_m=-1.0, top_m=3.0), Floor(name="Uppe
 @pytest.fixture
 def place() -> Iterator[PlanPlace]:
     with plan_place() as made:
-        for tag, height_m in (("low", 1.2), ("high", 4.5), ("unset", 0.0)):
-            made.bench.answers.site.set_tag(tag, TagSettings(height_m=height_m))
-        made.move("low", x=1.0, y=1.0)
-        made.move("high", x=-1.0, y=1.0)
-        made.move("unset", x=0.0, y=-1.0)
+        made.move("low", x=1.0, y=1.0, z=1.2, z_std=0.15)
+        made.move("high", x=-1.0, y=1.0, z=4.5, z_std=0.15)
+        made.move("unset", x=0.0, y=-1.0, z=0.0, z_std=0.15)
         made.put("ground", image_file(), floor=GROUND)
         yield made
 
@@ -65,9 +62,11 @@ def test_a_chosen_floor_shows_its_plans_and_makes_the_tags_of_others_faint(chrom
         page.wait_for("dropanchor.drawing().visible === 2 && dropanchor.drawing().elsewhere === 1")
         page.page.reload()
         expect(page.page.get_by_role("combobox", name="Floor", exact=True)).to_have_value("Upper")
-        place.bench.answers.site.set_tag("low", TagSettings(height_m=4.0))
+        place.move("low", x=1.0, y=1.0, z=4.0, z_std=0.15)
         page.wait_for("dropanchor.drawing().visible === 3 && dropanchor.drawing().elsewhere === 0")
         expect(low).to_have_count(0)
+        place.move("low", x=1.0, y=1.0, z=4.0, z_std=1.0)  # on this floor with a probability of 0.8
+        page.wait_for("dropanchor.drawing().visible === 2 && dropanchor.drawing().elsewhere === 1")
         assert page.errors == []
 
 

@@ -26,7 +26,7 @@ def test_tags_that_need_care_are_counted_and_filtered_and_the_panel_says_what_th
         expect(page.locator("#care")).to_be_hidden()
         health.record(tags.register("empty").row, {"battery_fraction": 0.08, "rssi_dbm": -82.0}, now_ns)
         chip = page.locator("#care")
-        expect(chip).to_have_text("Needs care 1", timeout=10_000)
+        expect(chip).to_have_text("Needs care 1")
         chip.click()
         expect(page.locator("tr[data-tag]:visible")).to_have_count(1)
         page.locator("tr[data-tag='empty']").click()
@@ -52,7 +52,7 @@ def test_the_panel_shows_how_far_the_clocks_of_a_tag_are_apart_and_what_to_do(ch
     with watched_page(chromium, place.url) as watched:
         watched.page.locator("tr[data-tag='phone']").click()
         health = watched.page.locator("[data-part='health']")
-        expect(health).to_contain_text("0.80 s ahead of the ranges ± 0.12 s", timeout=10_000)
+        expect(health).to_contain_text("0.80 s ahead of the ranges ± 0.12 s")
         expect(watched.page.locator("[data-part='care']")).to_contain_text("0.8 s ahead of that of its ranges")
         expect(health).to_contain_text("0.10 s behind the ranges ± 0.25 s")
 
@@ -68,7 +68,7 @@ def test_a_unit_that_a_tag_gets_wrong_is_accepted_with_one_click_and_may_be_undo
         page = watched.page
         page.locator("tr[data-tag='cart']").click()
         care = page.locator("[data-part='care']")
-        expect(care).to_contain_text(sentence, timeout=10_000)
+        expect(care).to_contain_text(sentence)
         care.get_by_role("button", name="Set acc_unit = g").click()
         expect(page.locator("#outcome")).to_contain_text("cart: acc_unit = g set.")
         assert site.tag_settings("cart").acc_unit == "g"

@@ -71,6 +71,10 @@ def test_every_text_about_tags_zones_anchors_and_settings_is_from_the_catalogue(
         for name in NAMES:
             page.page.locator(f"tr[data-tag='{name}']").click()
             found |= unmarked(page.page, *data)
+        page.page.locator(f"tr[data-tag='{NAMES[0]}']").click(modifiers=["Control"])
+        page.page.locator(f"tr[data-tag='{NAMES[0]}']").click(button="right")
+        found |= unmarked(page.page, *data)
+        page.page.locator("#menu button").first.click()
         page.page.locator("#detail summary").click()
         page.page.locator("[data-part='start']").click()
         found |= unmarked(page.page, *data)
@@ -89,6 +93,8 @@ def test_every_text_about_tags_zones_anchors_and_settings_is_from_the_catalogue(
         page.page.locator("[data-part='corner']").click()
         found |= unmarked(page.page, *data)
         page.page.locator("#events summary").click()
+        found |= unmarked(page.page, *data)
+        page.page.locator("#confirm [data-part='yes']").click()  # what is drawn is not saved
         page.page.locator("#measure").click()
         page.page.locator("#map").click(position={"x": 100, "y": 200})
         page.page.locator("#map").click(position={"x": 200, "y": 200})

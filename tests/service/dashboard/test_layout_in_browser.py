@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -45,6 +46,17 @@ def every_size(page: WatchedPage) -> Iterator[str]:
         yield f"{width}x{height}"
 
 
+@contextmanager
+def unfolded_tools(page: WatchedPage) -> Iterator[None]:
+    """Unfold the tools where one button stands for them, and fold them again."""
+    fold = page.page.locator("#tools-fold")
+    if fold.is_visible():
+        fold.click()
+    yield
+    if fold.is_visible():
+        fold.click()
+
+
 def test_no_number_is_cut_off(chromium: Browser, place: Place) -> None:
     place.move("a", x=-13.45, y=-56.78, speed=-10.31, sigma_pos=0.25, cov=np.eye(3), range=45.67, heading=2.0)
     place.move("b", x=-123.45, y=-9876.5, speed=-0.31, sigma_pos=123.4, cov=np.eye(3) * 1e4)
@@ -63,6 +75,7 @@ def test_no_number_is_cut_off(chromium: Browser, place: Place) -> None:
         for size in every_size(page):
             assert page.page.evaluate(CUT_OFF) == [], size
             assert page.page.evaluate("document.getElementById('detail').clientHeight") > 150, size
+            assert page.page.evaluate("document.documentElement.scrollHeight <= innerHeight"), size
 
 
 def test_names_that_differ_at_the_end_look_different(chromium: Browser, place: Place) -> None:
@@ -109,9 +122,10 @@ def test_show_all_keeps_every_tag_and_label_clear_of_the_edges_and_the_buttons(c
         for size in every_size(page):
             place.move(*names, x=x, y=y)
             page.wait_for_map(len(corners))
-            page.page.locator("#zoom-in").click()
-            page.page.locator("#zoom-in").click()
-            page.page.locator("#fit").click()
+            with unfolded_tools(page):
+                page.page.locator("#zoom-in").click()
+                page.page.locator("#zoom-in").click()
+                page.page.locator("#fit").click()
             page.wait_for_map(len(corners))
             assert len(page.page.evaluate("dropanchor.drawing().labels")) >= 4, size
             assert misplaced(page) == [], size

@@ -255,6 +255,6 @@ def test_a_negative_speed_can_be_read_in_the_table(chromium: Browser, place: Pla
         speed = page.page.locator("tr[data-tag='a'] td.c-speed")
         speed.wait_for()
         assert speed.inner_text() == "−10.31"
-        for column in ("x", "y", "sigma", "speed", "age"):
+        for column in ("x", "y", "accuracy", "speed", "age"):
             cell = page.page.locator(f"tr[data-tag='a'] td.c-{column}")
             assert cell.evaluate("cell => cell.scrollWidth <= cell.clientWidth"), column

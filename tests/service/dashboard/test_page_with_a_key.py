@@ -3,26 +3,27 @@
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser
 
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
 from support.api import make_api_bench
-from support.browser import running_chromium
 from support.http_server import running_server
+from support.patience import PATIENCE_S
 
 pytestmark = pytest.mark.browser
 
 
-def test_the_page_asks_for_a_key_stores_it_and_shows_the_tags(tmp_path: Path) -> None:
+def test_the_page_asks_for_a_key_stores_it_and_shows_the_tags(tmp_path: Path, chromium: Browser) -> None:
     now_s = 0.0
     keys = ApiKeys(tmp_path, lambda: now_s)
     secret = keys.add("dashboard", Scope.READ)
     bench = make_api_bench()
     bench.move("cart")
     app = bench.app(DASHBOARD, authenticator=Authenticator({SOURCE: keys}))
-    with running_server(app, bench.stopping) as port, running_chromium() as browser:
-        page = browser.new_page()
+    with running_server(app, bench.stopping) as port, chromium.new_page() as page:
+        page.set_default_timeout(1000 * PATIENCE_S)
         page.goto(f"http://127.0.0.1:{port}/")
         page.locator("#locked").wait_for()
         assert page.locator("#status-text").inner_text() == "Locked"

@@ -5,7 +5,7 @@ import math
 import re
 import time
 from collections.abc import Iterator
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -14,7 +14,7 @@ from playwright.sync_api import Browser, expect
 
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.api.app import DASHBOARD
-from dropanchor_service.api.routes.event_parts import EventParts
+from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.estimation.columns import Frame, State
 from dropanchor_service.events.drafts import Stay
 from dropanchor_service.history.storage import Retention
@@ -86,7 +86,7 @@ def test_a_link_leads_to_a_moment_of_the_past_and_back_to_the_present(
         assert tags["turned"]["state"] == "relative"
         assert math.isnan(tags["turned"]["x"])  # it is no place of the map
         assert tags["first"]["semiMajor"] == pytest.approx(0.2 * 2.4477, rel=1e-2)
-        expect(page.page.locator("[data-part='v-sigma']")).to_have_text("± 0.20 m")
+        expect(page.page.locator("[data-part='v-accuracy']")).to_have_text("± 0.49 m along, ± 0.24 m across")
         expect(page.page.locator("[data-part='v-anchor']")).to_be_hidden()  # not stored
         expect(page.page.locator("#status-text")).to_have_text("Past")
         expect(page.page.locator(".past .note")).to_contain_text("not the present")
@@ -209,25 +209,63 @@ def test_a_period_is_chosen_and_a_wrong_or_an_empty_one_is_explained(
         page.wait_for_map(2)  # "turned" was lost an hour ago, nobody knows where
         page.page.locator("#history").click()
         wait_for_past(page, 3)
+        assert page.tags()["first"]["x"] == pytest.approx(
+            0, abs=0.1
+        )  # the past begins with its first pose, not an hour before the last one
+        begin = datetime.fromtimestamp(end_ns / SECOND - 60 * MINUTES)
+        shown = datetime.fromisoformat(page.page.locator("[data-part='from']").input_value())
+        assert 0 <= (begin - shown).total_seconds() <= 20
         page.page.locator("[data-part='to']").fill("2020-01-02T00:00:00")
         page.page.locator("[data-part='from']").fill("2020-01-01T00:00:00")
-        page.page.locator(".period button:not([data-part])").click()
+        page.page.locator("[data-part='show']").click()
         wait_for_past(page, 0)
         problem = page.page.locator(".past [data-part='problem']")
-        expect(problem).to_have_text("No poses are stored in this period.")
+        expect(problem).to_have_text(re.compile("No poses are stored in this period. All poses are from .* to "))
         local = [
             datetime.fromtimestamp(t / SECOND).strftime("%Y-%m-%dT%H:%M:%S") for t in (end_ns - 60 * SECOND, end_ns)
         ]
         page.page.locator("[data-part='from']").fill(local[1])
         page.page.locator("[data-part='to']").fill(local[0])
-        page.page.locator(".period button:not([data-part])").click()
+        page.page.locator("[data-part='show']").click()
         expect(problem).to_contain_text("end must come after the start")
         page.page.locator("[data-part='from']").fill(local[0])
         page.page.locator("[data-part='to']").fill(local[1])
-        page.page.locator(".period button:not([data-part])").click()
+        page.page.locator("[data-part='show']").click()
         wait_for_past(page, 3)
         expect(problem).to_have_text("")
         assert page.errors == []
+
+
+def test_the_slider_shows_where_poses_are_and_a_day_is_chosen_at_once(chromium: Browser, tmp_path: Path) -> None:
+    bench = live_api_bench(folder=tmp_path, retention=RETENTION)
+    noon = datetime.now().replace(hour=12, minute=0, second=0, microsecond=0) - timedelta(days=1)
+    noon_ns = round(noon.timestamp()) * SECOND
+    with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+        place = Place(bench, f"http://127.0.0.1:{port}/")
+        with watched_page(chromium, place.url) as page:
+            page.page.locator("#history").click()
+            expect(page.page.locator(".past [data-part='problem']")).to_contain_text("Nothing is stored yet")
+            for end_ns in (noon_ns, noon_ns + 3600 * SECOND):
+                write_past(place, end_ns, minutes=1)
+            page.page.get_by_role("button", name="Yesterday").click()
+            wait_for_past(page, 3)
+            page.wait_for(
+                "document.querySelectorAll('[data-part=stored]')[0].getAttribute('d')?.split('M').length === 3"
+            )
+            assert page.page.evaluate("dropanchor.past().time_ms") == noon_ns / 1e6 - 60_000
+            gap = page.page.locator(".past [data-part='gap']")
+            expect(gap).to_have_text("")
+            address = (
+                f"from={iso(noon_ns - 60 * SECOND)}&to={iso(noon_ns + 3600 * SECOND)}&at={iso(noon_ns + 1800 * SECOND)}"
+            )
+            page.page.goto(f"{place.url}#{address}")
+            expect(gap).to_contain_text("No poses from")
+            page.page.locator("[data-part='day']").fill(f"{noon:%Y-%m-%d}")
+            page.wait_for(f"dropanchor.past().time_ms === {noon_ns / 1e6 - 60_000:.0f}")
+            expect(page.page.locator("[data-part='to']")).to_have_value(f"{noon + timedelta(days=1):%Y-%m-%dT00:00}")
+            page.page.locator("[data-part='day']").fill("2999-01-01")
+            expect(page.page.locator(".past [data-part='problem']")).to_contain_text("has not begun")
+            assert page.errors == []
 
 
 def test_a_service_without_a_history_says_how_to_keep_one(chromium: Browser, place: Place) -> None:

@@ -48,7 +48,7 @@ def add(panel: Locator, *files: FilePayload) -> Locator:
     panel.get_by_label("File").set_input_files(list(files))
     panel.get_by_role("button", name="Add plan").click()
     form = panel.get_by_role("form", name="Floor plan", exact=True)
-    expect(form).to_be_visible(timeout=30_000)
+    expect(form).to_be_visible()
     return form
 
 
@@ -91,9 +91,13 @@ def test_a_plan_is_uploaded_and_aligned_by_two_points_in_every_open_page(chromiu
         expect(form.get_by_label("Name")).to_have_value("North hall")
         other.wait_for("dropanchor.plans().length === 1 && dropanchor.plans()[0].isReady")
         form.get_by_role("button", name="Add point").click()
+        page.page.locator("#map").click(position={"x": 10, "y": 10})
+        expect(form.get_by_role("status").get_by_text("That was beside the plan.")).to_be_visible()
         click_pixel(page, 40, 20)
         expect(form.get_by_text("Now say where this place is")).to_be_visible()
         form.get_by_label("Point 1 is at anchor").select_option("17")
+        expect(form.get_by_label("Point 1: x in m")).to_have_value("0")
+        expect(form.locator("li small")).to_have_text([""])
         form.get_by_role("button", name="Add point").click()
         click_pixel(page, 360, 20)
         form.get_by_label("Point 2: x in m").fill("0")
@@ -109,6 +113,10 @@ def test_a_plan_is_uploaded_and_aligned_by_two_points_in_every_open_page(chromiu
         page.page.locator("#outcome").get_by_role("button", name="Undo").click()
         wait_until(lambda: place.plans.all["north-hall"].control_points == [])
         other.wait_for("dropanchor.plans()[0].placement.rotation_rad === 0")
+        page.page.get_by_role("button", name="North hall").click()
+        form.get_by_role("button", name="Cancel").click()
+        form = add(page.page.get_by_role("region", name="Floor plans", exact=True), HALL)
+        expect(form.get_by_label("Name")).to_have_value("North hall 2")
         assert page.errors == other.errors == []
 
 
@@ -208,7 +216,7 @@ def test_the_buttons_appear_although_the_first_request_for_the_access_fails(
     with watched_page(chromium, place.url) as page:
         page.page.route("**/api/v1/access", lambda route: route.abort(), times=2)
         page.page.reload()
-        expect(page.page.get_by_role("button", name="Set up floor plans")).to_be_visible(timeout=20_000)
+        expect(page.page.get_by_role("button", name="Set up floor plans")).to_be_visible()
 
 
 def test_an_image_that_did_not_arrive_is_requested_again(chromium: Browser, place: PlanPlace) -> None:
@@ -246,7 +254,7 @@ def test_a_page_of_a_pdf_is_chosen(chromium: Browser, place: PlanPlace) -> None:
         panel.get_by_label("File").set_input_files(file("hall.pdf", "application/pdf", pdf_file((72, 72), (144, 72))))
         panel.get_by_label("Page").fill("2")
         panel.get_by_role("button", name="Add plan").click()
-        expect(panel.get_by_role("form", name="Floor plan", exact=True)).to_be_visible(timeout=30_000)
+        expect(panel.get_by_role("form", name="Floor plan", exact=True)).to_be_visible()
         assert place.plans.all["hall"].image.width_px == 400
 
 
@@ -257,7 +265,7 @@ def test_a_drawing_that_a_browser_cannot_draw_in_time_is_named_and_the_page_live
     place.put("heavy", svg_file(layers), name="Heavy")
     place.put("hall", image_file(WIDTH, HEIGHT), name="Hall")
     with watched_page(chromium, place.url) as page:
-        expect(page.page.locator("#plan-faults")).to_contain_text("Heavy", timeout=60_000)
+        expect(page.page.locator("#plan-faults")).to_contain_text("Heavy")
         expect(page.page.locator("#plan-faults")).not_to_contain_text("Hall")
         page.wait_for("dropanchor.plans().some(({ id, isReady }) => id === 'hall' && isReady)")
         expect(open_panel(page).get_by_role("button", name="Heavy")).to_be_visible()
@@ -270,7 +278,7 @@ def test_a_file_that_is_refused_says_why(chromium: Browser, place: PlanPlace) ->
         for content, words in ((svg_file("<script/>"), "<script>"), (image_file(), "said to be image/svg+xml")):
             panel.get_by_label("File").set_input_files(file("a.svg", "image/svg+xml", content))
             panel.get_by_role("button", name="Add plan").click()
-            expect(panel.get_by_role("alert")).to_contain_text(words, timeout=30_000)
+            expect(panel.get_by_role("alert")).to_contain_text(words)
         assert place.plans.all == {}
         assert all("422" in error for error in page.errors)
 
@@ -287,7 +295,7 @@ def test_a_georeferenced_image_lies_right_at_once(chromium: Browser) -> None:
         panel.get_by_label("File").set_input_files([file("hall.png", "image/png", image_file(WIDTH, HEIGHT)), world])
         panel.get_by_label("Coordinate system").fill("site")
         panel.get_by_role("button", name="Add plan").click()
-        expect(form).to_be_visible(timeout=30_000)
+        expect(form).to_be_visible()
         placement = place.plans.all["hall"].placement
         assert (placement.x, placement.y, placement.m_per_px) == pytest.approx((11.0, 4.0, 0.05))
 
@@ -345,10 +353,20 @@ def test_a_key_shows_the_plans_and_only_the_buttons_that_it_may_use(
             expect(form.get_by_role("button", name="Delete…")).to_have_count(deletes)
 
 
-def test_a_plan_is_deleted_after_a_question_and_an_undo_brings_it_back(chromium: Browser, place: PlanPlace) -> None:
+def test_a_moved_plan_goes_back_and_one_deleted_after_a_question_comes_back(
+    chromium: Browser, place: PlanPlace
+) -> None:
     plan = place.put("hall", image_file(WIDTH, HEIGHT), name="Hall")
     with watched_page(chromium, place.url) as page:
         form = edit(page, open_panel(page), "Hall")
+        form.get_by_role("button", name="Move by hand").click()
+        x = page.page.evaluate("dropanchor.draft().placement.x")
+        for _ in range(2):
+            page.page.locator("#map").press("Shift+ArrowRight")
+        page.wait_for(f"dropanchor.draft().placement.x === {x} + 2")
+        expect(page.page.locator("#outcome")).to_contain_text("Plan moved. Not saved yet.")
+        page.page.keyboard.press("Control+z")
+        page.wait_for(f"dropanchor.draft().placement.x === {x}")
         form.get_by_role("button", name="Delete…").click()
         page.page.get_by_role("dialog").get_by_role("button", name="Delete").click()
         expect(page.page.locator("#outcome")).to_contain_text("Plan Hall deleted.")

@@ -1,26 +1,29 @@
-"""The page can say every sentence of the service in German."""
+"""The page has words of its own, in each language, for every sentence that the service can send."""
 
-import json
+import pickle
 import re
-import shutil
-import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
 import pytest
+from pydantic import ValidationError
 
 from dropanchor_schemas.rejections import Reason
-from dropanchor_schemas.zones import Polygon
+from dropanchor_schemas.sentences import Sentence, phrase_of, said_by, say, with_stop
+from dropanchor_schemas.zones import Circle, Polygon
 from dropanchor_service.answers import hints, unused
 from dropanchor_service.answers.care import care_of
 from dropanchor_service.answers.columns import REASONS
-from dropanchor_service.api.app import DASHBOARD
+from dropanchor_service.api.http.closing import reason_of
+from dropanchor_service.api.http.errors import message_of
 from dropanchor_service.checkpoints import files as of_checkpoints
 from dropanchor_service.checkpoints.layouts import VERSION
 from dropanchor_service.cluster import sentences as of_cluster
+from dropanchor_service.cluster.tenure import Standing, Tenure
 from dropanchor_service.cluster.watch import Lease, obstacle
+from dropanchor_service.delivery.registry import NO_DESTINATIONS
 from dropanchor_service.engines.warm_up import CompilationProgress
 from dropanchor_service.events import database as of_events
 from dropanchor_service.history.sqlite import store as of_history
@@ -28,7 +31,7 @@ from dropanchor_service.node import sentences as of_node
 from dropanchor_service.node.owners import Owner
 from dropanchor_service.plans import images as of_images
 from dropanchor_service.runtime.kernel_cache import VARIABLE
-from dropanchor_service.runtime.recovery import BEGINS_EMPTY, COPY_USED, Recovery
+from dropanchor_service.runtime.recovery import BEGINS_EMPTY, COPY_USED, DAMAGED, Recovery, damaged, unreadable
 from dropanchor_service.security import share_links as of_links
 from dropanchor_service.store import HealthTable, TagTable
 from dropanchor_service.store.clock_offsets import ClockOffset, MotionOffset
@@ -36,29 +39,19 @@ from dropanchor_service.store.tags import KINDS
 from dropanchor_service.store.unknown_anchors import hint_about
 from dropanchor_service.store.wrong_times import hint_about_time
 from dropanchor_service.zones.shapes import ShapeError, vertices_of
-from support.refusals import sentences_about_bodies, sentences_of_the_code
-
-OTHERWISE = "Der Dienst hat abgelehnt: "
-
-SAY = """
-import { readFileSync } from "node:fs";
-globalThis.location = { search: "?lang=de", hash: "" };
-const { refusal, said } = await import(process.argv[1] + "/i18n/said.js");
-const { words } = await import(process.argv[1] + "/data/format.js");
-const { sentences = [], codes = [], refusals = [] } = JSON.parse(readFileSync(0));
-console.log(JSON.stringify([...sentences.map(said), ...codes.map(words), ...refusals.map(refusal)]));
-"""
+from support.refusals import refusals_without_a_code, sentences_about_bodies
+from support.sentences import PREFIX, about_sensors, calls, in_words, messages, placeholders
 
 
 def hints_of_poses() -> Iterator[str]:
     yield from filter(None, hints.HINTS)
     yield hints.RELATIVE_HINT
-    yield from (hints.MOUNT_UNKNOWN, hints.RANGES_COME, hints.MOTION_COMES, hints.NEEDS_BOTH.format(5, 120))
-    for template in (hints.LATE, hints.IN_BURSTS, hints.FEW_RANGES, hints.ALL_ZERO, hints.LAGS):
-        yield template.format(8)
+    yield from (hints.MOUNT_UNKNOWN, hints.RANGES_COME, hints.MOTION_COMES, hints.needs_both(5, 120))
+    for say_so in (hints.late, hints.in_bursts, hints.few_ranges, hints.all_zero, hints.lags):
+        yield say_so(8)
     for what, reasons in unused.WHY.items():
-        for why in (*filter(None, reasons.values()), unused.BEHIND.format(3.1)):
-            yield unused.NOT_USED.format(399, 401, unused.NOUNS[what], why)
+        for why in (*filter(None, reasons.values()), unused.behind(3.1)):
+            yield unused.not_used(399, 401, what, why)
     for hears_others in (True, False):
         yield hint_about("9A", hears_others=hears_others)
     for unit_ns in (1, 10**3, 10**6, 10**9):
@@ -88,7 +81,7 @@ def refused_shapes() -> Iterator[str]:
     for points in (line, crossing):
         with pytest.raises(ShapeError) as refused:
             vertices_of(Polygon(type="polygon", points=points))
-        yield f"{refused.value}."
+        yield with_stop(said_by(refused.value))
 
 
 def sentences_of_a_cluster() -> Iterator[str]:
@@ -101,7 +94,10 @@ def sentences_of_a_cluster() -> Iterator[str]:
     yield of_cluster.database_away("yard", "connection refused")
     yield of_cluster.takes_over("yard")
     yield of_cluster.in_doubt("yard")
-    yield of_cluster.gone("yard", "an owner with the higher epoch 5 is alive")
+    tenure = Tenure(4, 1.0, lambda: 9.0, lambda: False, asked_s=0.0)
+    tenure.saw_epoch(5)
+    assert tenure.standing is Standing.LOST
+    yield of_cluster.gone("yard", tenure.why_lost)
 
 
 def sentences_of_a_node() -> Iterator[str]:
@@ -109,20 +105,20 @@ def sentences_of_a_node() -> Iterator[str]:
     yield of_node.NO_BUCKETS
     yield of_node.without_owner(owner.bucket)
     yield of_node.socket_followed(owner.bucket)
-    for say in (
+    for said_of in (
         *(of_node.without_address, of_node.unreachable, of_node.cut_short, of_node.silent, of_node.former),
         of_node.socket_unreachable,
     ):
-        yield say(owner)
+        yield said_of(owner)
 
 
 def damage(folder: Path) -> Iterator[str]:
     recovery = Recovery(folder)
     for instead in (
         *(BEGINS_EMPTY, COPY_USED, of_history.INSTEAD, of_events.INSTEAD, of_checkpoints.INSTEAD),
-        *(of_images.INSTEAD, of_links.ENDED),
+        *(of_images.INSTEAD, of_links.ENDED, NO_DESTINATIONS),
     ):
-        for why in ("is damaged", "is damaged (file is not a database)", "is empty", "cannot be read (Is a directory)"):
+        for why in (DAMAGED, damaged("file is not a database"), unreadable(IsADirectoryError(21, "Is a directory"))):
             path = folder / f"{len(list(folder.iterdir()))}.json"
             path.touch()
             recovery.set_aside(path, why, instead)
@@ -133,75 +129,135 @@ def damage(folder: Path) -> Iterator[str]:
 def progress() -> Iterator[str]:
     compilation = CompilationProgress()
     yield compilation.sentence
-    for what in (
-        "the estimator, which takes about a minute",
-        "the decoder of messages",
-        "the encoder of answers",
-        "the zones",
-    ):
-        compilation.begin(what)
+    for said in (said for said in calls() if said.code in ("the_estimator", "the_decoder", "the_encoder", "the_zones")):
+        compilation.begin(say(str(said.code), str(said.text)))
         for folder in ("/home/.cache/dropanchor/kernels-1", "/tmp/dropanchor-kernels-1"):
             with patch.dict("os.environ", {VARIABLE: folder}):
                 yield compilation.sentence
 
 
-def in_german(**texts: list[str]) -> list[str]:
-    """Return what the page makes of `sentences`, `codes` and `refusals`."""
-    node = shutil.which("node")
-    if node is None:
-        pytest.skip("node is not installed: this test runs a module of the page")
-    command = [node, "--input-type=module", "--eval", SAY, str(DASHBOARD)]
-    run = subprocess.run(command, input=json.dumps(texts), capture_output=True, text=True, timeout=60, check=True)
-    translations: list[str] = json.loads(run.stdout)
-    return translations
-
-
-def test_every_sentence_and_every_code_has_a_german_translation(tmp_path: Path) -> None:
+def every_hint(tmp_path: Path) -> list[str]:
     of_processes = {*sentences_of_a_cluster(), *sentences_of_a_node(), *progress(), *damage(tmp_path)}
-    sentences = sorted({*hints_of_poses(), *hints_of_care(), *refused_shapes(), *of_processes})
+    return sorted({*hints_of_poses(), *hints_of_care(), *refused_shapes(), *of_processes})
+
+
+def test_every_sentence_has_one_code_and_one_text_which_stand_in_the_code() -> None:
+    texts: dict[str | None, set[str | None]] = {}
+    for said in calls():
+        assert said.code is not None, said.where
+        assert said.text is not None, said.where
+        assert said.values == placeholders(said.text), said.where
+        texts.setdefault(said.code, set()).add(said.text)
+    assert len(texts) > 150
+    assert {code: found for code, found in texts.items() if len(found) > 1} == {}
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_the_page_has_a_sentence_with_the_same_values_for_every_code_that_the_service_can_send(language: str) -> None:
+    of_page = {key: placeholders(text) for key, text in messages(language).items() if key.startswith(PREFIX)}
+    of_service = {f"{PREFIX}{said.code}": said.values for said in (*calls(), *about_sensors())}
+    of_bodies = {f"{PREFIX}{code}": values for code, values in codes_about_bodies().items()}
+    assert {key: names for key, names in of_service.items() if of_page.get(key) != names} == {}
+    assert {key: names for key, names in of_bodies.items() if not of_page.get(key, {"missing"}) <= names} == {}
+    assert of_page.keys() - of_service.keys() - of_bodies.keys() == set()
+
+
+def codes_about_bodies() -> dict[str, frozenset[str]]:
+    """Return the codes of what is said about wrong values in bodies, and the values of each."""
+    found: dict[str, frozenset[str]] = {}
+    for text in sentences_about_bodies():
+        assert isinstance(text, Sentence), text
+        found[text.code] = found.get(text.code, frozenset(text.values)) & frozenset(text.values)
+    assert len(found) > 30
+    return found
+
+
+def test_all_that_a_person_can_do_carries_a_code_and_is_german_on_a_german_page(tmp_path: Path) -> None:
+    sentences = every_hint(tmp_path)
+    assert [text for text in sentences if not isinstance(text, Sentence)] == []
     codes = [*REASONS, *Reason, *KINDS]
     same = {"imu"}
     untranslated = [
         text
-        for text, said in zip([*sentences, *codes], in_german(sentences=sentences, codes=codes), strict=True)
-        if said.lower() == text.replace("_", " ").lower() and text not in same
+        for text, said in zip([*sentences, *codes], in_words("de", sentences, codes=codes), strict=True)
+        if (said.lower() == text.replace("_", " ").lower() and text not in same)
+        or "{" in said
+        or re.search(r"\b(the|is|are|and)\b", without_quotes(said).replace("the-yard", ""))
     ]
     assert untranslated == []
 
 
-def test_every_refusal_that_the_page_can_show_has_a_german_translation() -> None:
-    of_code, of_bodies = sorted(sentences_of_the_code()), sorted(sentences_about_bodies())
-    assert len(of_code) > 80
-    assert len(of_bodies) > 60
-    parts = [f"body.shape.points.3: {text}" for text in of_bodies]
-    several = ["; ".join(f"body.{number}: {text}" for number, text in enumerate(of_bodies[at::30])) for at in range(30)]
-    texts = [*of_code, *of_bodies, *parts, *several]
-    untranslated = [
-        (text, said)
-        for text, said in zip(texts, in_german(refusals=texts), strict=True)
-        if text in said
-        or said.startswith(OTHERWISE)
-        or re.search(r"\b(the|should|is|not|must)\b", without_quotes(said))
+def test_the_english_page_says_what_the_service_says(tmp_path: Path) -> None:
+    sentences = every_hint(tmp_path)
+    assert in_words("en", sentences) == [str(text) for text in sentences]
+
+
+def test_every_refusal_that_the_page_can_show_has_a_code() -> None:
+    assert refusals_without_a_code() == set()
+
+
+def test_every_refusal_of_a_body_is_german_on_a_german_page() -> None:
+    parts = [
+        {"location": "body.shape.points.3", "detail": text, "detail_phrase": phrase_of(text)}
+        for text in sorted(sentences_about_bodies())
     ]
-    assert untranslated == []
+    problems = [{"detail": "body: wrong", "errors": [*parts[at::30]]} for at in range(30)]
+    for said in in_words("de", refusals=problems):
+        assert not re.search(r"\b(the|should|is|not|must)\b", without_quotes(said)), said
 
 
 def without_quotes(text: str) -> str:
     """Return the text without what the service quotes, such as values and commands."""
-    return re.sub(r"'[^']*'|`[^`]*`|https?:\S*", "", text)
+    return re.sub(r"'[^']*'|`[^`]*`|\([^)]*\)|https?:\S*", "", text)
 
 
-def test_values_inside_a_refusal_are_translated_too_and_the_unknown_is_quoted() -> None:
-    refusals = {
-        "Authentication failed: the API key has expired. Send an API key or a token in the header `Authorization: "
-        "Bearer …`. An operator creates a key with `dropanchor key add NAME --scope read`; for the samples of a tag, "
-        "with `--tag TAG` instead of `--scope`.": "Anmeldung gescheitert: Der API-Schlüssel ist abgelaufen. Senden",
-        "The API key of 'x' has the scope read; this request needs the scope write.": "Der Zugang 'x' (API-Schlüssel) "
-        "hat den Umfang read; diese Anfrage braucht den Umfang write.",
-        "List should have at most 2 items after validation, not 3": "Die Liste ist zu lang: 3 statt höchstens 2 Eintr",
-        "body.x: Input should be less than or equal to 0.9; body.y: Field required": "body.x: Der Wert darf höchstens "
-        "0,9 sein; body.y: Die Angabe fehlt",
-        "Nothing that anybody foresaw.": "Der Dienst hat abgelehnt: Nothing that anybody foresaw.",
-    }
-    for said, wanted in zip(in_german(refusals=list(refusals)), refusals.values(), strict=True):
-        assert said.startswith(wanted)
+def test_values_inside_a_refusal_are_said_in_german_too() -> None:
+    expired = say("why_key_expired", "the API key has expired")
+    nested = say("credentials_refused", "Authentication failed: {why}. {how}", why=expired, how="Look.")
+    with pytest.raises(ValidationError) as refused:
+        Circle.model_validate({"type": "circle", "x": 1e12, "radius_m": 1.0})
+    errors = [
+        {"location": f"body.{part['loc'][0]}", "detail": message_of(part), "detail_phrase": phrase_of(message_of(part))}
+        for part in refused.value.errors()
+    ]
+    problems = [
+        {"detail": nested, "detail_phrase": phrase_of(nested)},
+        {"detail": "body.x: Input should be …", "errors": errors},
+        {"detail": "Nothing that anybody foresaw."},
+        {"detail": "A new sentence.", "detail_phrase": {"code": "of_a_later_service", "values": {}}},
+    ]
+    assert in_words("de", refusals=problems) == [
+        "Anmeldung gescheitert: Der API-Schlüssel ist abgelaufen. Look.",
+        "body.x: Der Wert darf höchstens 100000 sein; body.y: Die Angabe fehlt",
+        "Der Dienst hat abgelehnt: Nothing that anybody foresaw.",
+        "Der Dienst hat abgelehnt: A new sentence.",
+    ]
+
+
+def test_a_sentence_with_an_unknown_code_is_shown_as_the_service_says_it() -> None:
+    outer = say("not_accepted", "Not accepted: {why}.", why=say("of_a_later_service", "the moon is full"))
+    unknown = say("of_a_later_service", "The moon is full.")
+    assert in_words("de", [outer, unknown]) == ["Nicht angenommen: the moon is full.", "The moon is full."]
+
+
+def test_a_decimal_number_in_a_sentence_has_a_comma_in_german() -> None:
+    sentence = say("why_behind", "they are older by {seconds} s", seconds="3.1")
+    assert "um 3,1 s älter" in in_words("de", [sentence])[0]
+
+
+def test_a_sentence_keeps_its_code_when_it_is_copied_to_another_process() -> None:
+    sentence = say("not_accepted", "Not accepted: {why}.", why=say("is_empty", "is empty"))
+    copy = pickle.loads(pickle.dumps(sentence))
+    assert (copy, copy.code, copy.values) == (sentence, sentence.code, sentence.values)
+    assert copy.values == {"why": "is empty", "why.code": "is_empty"}
+
+
+@pytest.mark.parametrize("text", [say("needs_key", "Key: {command}.", command="dropanchor key add NAME"), "No code."])
+def test_the_end_of_a_websocket_fits_its_frame_and_has_the_code_for_who_asks(text: str) -> None:
+    plain, coded = ({"query_string": query} for query in (b"tag=a", b"tag=a&reasons=code"))
+    assert reason_of(text, plain) == text
+    assert len(reason_of("ü" * 200, coded).encode()) <= 123
+    wanted = "Legen Sie einen an mit dropanchor key add NAME." if isinstance(text, Sentence) else "No code."
+    assert in_words("de", ends=[reason_of(text, coded)])[0].endswith(wanted)
+    long = say("no_ingest_site", "{site} {command}", site="s" * 120, command="c")
+    assert reason_of(long, coded) == f"{'s' * 120} c"

@@ -28,6 +28,8 @@ def test_no_violation_while_a_site_is_set_up(chromium: Browser, place: Place, ax
         assert_no_violation(page, axe)
         page.page.get_by_role("dialog").get_by_role("button", name="Cancel").click()
         page.page.locator("tr[data-tag='cart']").click()
+        assert_no_violation(page, axe)
+        page.page.get_by_role("dialog").get_by_role("button", name="Discard").click()
         page.page.locator("#detail summary").click()
         page.page.get_by_role("button", name="The tag is here…").click()
         expect(page.page.get_by_role("form", name="Where the tag is")).to_be_visible()

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, expect
 
@@ -26,7 +27,7 @@ def test_units_are_chosen_remembered_and_used_everywhere_while_settings_stay_si(
     place = zone_place()
     place.put(disc("dock", 0.0, 0.0, 3.048, name="Dock", speed_mps=2.5))
     place.go("cart", 3.048, -6.096)
-    place.move("cart", x=3.048, y=-6.096, speed=2.0, sigma_pos=0.3048)
+    place.move("cart", x=3.048, y=-6.096, speed=2.0, cov=np.diag([0.25, 0.25, 0.001]))
     with served(place), watched_page(chromium, place.url, reduced_motion="reduce") as watched:
         page = watched.page
         page.get_by_role("button", name="Display").click()
@@ -36,7 +37,7 @@ def test_units_are_chosen_remembered_and_used_everywhere_while_settings_stay_si(
         row = page.locator("tr[data-tag='cart']")
         expect(row.locator(".c-x")).to_have_text("10.00")
         expect(row.locator(".c-y")).to_have_text("−20.00")
-        expect(row.locator(".c-sigma")).to_have_text("1.00")
+        expect(row.locator(".c-accuracy")).to_have_text("4.02")
         expect(row.locator(".c-speed")).to_have_text("4.47")
         expect(page.locator("th.c-x")).to_have_text("x ft")
         row.click()

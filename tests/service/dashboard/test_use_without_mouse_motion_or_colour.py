@@ -111,7 +111,7 @@ def test_a_question_mark_shows_the_keys_and_keys_go_where_one_types(
         page.keyboard.press("?")
         keys = page.get_by_role("dialog", name="Keyboard")
         expect(keys).to_be_visible()
-        assert keys.locator("dt").count() == keys.locator("dd").count() == 12
+        assert keys.locator("dt").count() == keys.locator("dd").count() == 15
         page.screenshot(path=tmp_path / "keys.png")
         page.keyboard.press("/")
         expect(page.locator("#filter")).not_to_be_focused()

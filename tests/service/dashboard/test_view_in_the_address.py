@@ -56,7 +56,7 @@ def test_a_copied_link_shows_the_same_tag_map_filter_language_and_units(
         page.page.screenshot(path=tmp_path / "display.png")
         assert page.errors == []
     with watched_page(chromium, link, reduced_motion="reduce") as page:
-        expect(page.page.locator("#count")).to_have_text("1 von 6 Tags", timeout=15_000)
+        expect(page.page.locator("#count")).to_have_text("1 von 6 Tags")
         expect(page.page.locator("#detail h2")).to_have_text("cart-1")
         expect(page.page.locator("#filter")).to_have_value("cart")
         expect(page.page.locator("#group")).to_have_value("forklifts")

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Locator, expect
+from playwright.sync_api import Browser, Locator, Route, expect
 
 from dropanchor_schemas.zones import Circle, Polygon
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
@@ -60,6 +60,8 @@ def test_a_polygon_is_drawn_with_clicks_and_watched_at_once(chromium: Browser, y
         form.get_by_label("Name").fill("Gate 7")
         form.get_by_label("Too long after").fill("300")
         form.get_by_label("Event on leaving").uncheck()
+        form.get_by_label("From height").fill("3")
+        form.get_by_label("to height").fill("6.5")
         form.get_by_label("Tags").fill("cart-3, cart-4")
         form.get_by_label("Groups").fill("Carts of hall 2, forklifts")
         form.get_by_label("Delay").fill("0")
@@ -67,11 +69,12 @@ def test_a_polygon_is_drawn_with_clicks_and_watched_at_once(chromium: Browser, y
         expect(form).to_be_hidden()
         made = yard.zones["gate-7"]
         assert (made.name, made.dwell_s, made.enter, made.exit) == ("Gate 7", 300.0, True, False)
+        assert (made.z_min_m, made.z_max_m) == (3.0, 6.5)
         assert made.tags == ["cart-3", "cart-4"]
         assert made.groups == ["Carts of hall 2", "forklifts"]
         (x0, y0), (x1, _), (_, y2), _ = points_of(yard, "gate-7")
         assert (x1 - x0) / (y0 - y2) == pytest.approx(1.2, rel=0.02)
-        yard.go("cart-3", (x0 + x1) / 2, (y0 + y2) / 2)
+        yard.go("cart-3", (x0 + x1) / 2, (y0 + y2) / 2, z=4.0, z_std=0.1)
         expect(page.page.locator("#events summary")).to_contain_text("cart-3 entered Gate 7")
         assert page.errors == []
 
@@ -131,6 +134,28 @@ def test_a_circle_is_placed_sized_and_edited(chromium: Browser, yard: ZonePlace)
         form.get_by_role("button", name="Save zone").click()
         expect(form).to_be_hidden()
         assert yard.zones["pit"].shape == drawn.model_copy(update={"radius_m": 2.5})
+        assert page.errors == []
+
+
+def test_another_panel_waits_for_a_save_that_takes_its_time_and_asks_nothing(
+    chromium: Browser, yard: ZonePlace
+) -> None:
+    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+        form = open_list(page)
+        held: list[Route] = []
+        page.page.route(
+            "**/zones/yard", lambda route: held.append(route) if route.request.method == "PUT" else route.continue_()
+        )
+        page.page.get_by_role("button", name="Edit Yard").click()
+        form.get_by_label("Name").fill("Depot")
+        form.get_by_role("button", name="Save zone").click()
+        page.page.locator("#edit").click()
+        expect(form).to_be_visible()
+        expect(page.page.locator("#confirm")).to_be_hidden()
+        held[0].continue_()
+        expect(page.page.locator("#setup")).to_be_visible()
+        expect(form).to_be_hidden()
+        assert yard.zones["yard"].name == "Depot"
         assert page.errors == []
 
 

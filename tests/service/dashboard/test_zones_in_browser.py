@@ -72,8 +72,10 @@ def test_the_lists_of_the_present_are_hidden_while_the_page_shows_the_past(chrom
         expect(sentence).to_be_hidden()
         expect(lists[1]).to_contain_text("1 tag inside")
         lists[1].get_by_role("button", name="Edit Yard").click()
-        page.page.locator("#history").click()
         expect(page.page.get_by_role("form", name="Zone", exact=True)).to_be_visible()
+        page.page.locator("#history").click()
+        expect(page.page.get_by_role("form", name="Zone", exact=True)).to_be_hidden()
+        assert not page.page.evaluate("dropanchor.panels().zone")
 
 
 def test_events_come_live_and_newest_first_and_a_click_selects_tag_and_zone(chromium: Browser, yard: ZonePlace) -> None:
@@ -113,5 +115,5 @@ def test_nothing_is_counted_while_the_connection_is_lost_and_missed_events_come_
         place.go("cart-3", -10.0, -10.0)
         place.bench.stopping = Event()
         with served(place, port=port):
-            expect(page.page.locator("#events summary")).to_contain_text("cart-3 left Yard", timeout=40_000)
+            expect(page.page.locator("#events summary")).to_contain_text("cart-3 left Yard")
             expect(page.page.locator("#zone-list li")).to_contain_text("empty")

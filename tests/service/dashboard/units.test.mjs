@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 globalThis.location = /** @type {any} */ ({ search: "?length=ft", hash: "#velocity=kmh" });
 const PAGE = "../../../service/dropanchor_service/dashboard";
-const { coordinate, distance, ellipse, length, place, sigma, speed } = await import(`${PAGE}/data/format.js`);
+const { accuracy, coordinate, distance, half, length, place, speed } = await import(`${PAGE}/data/format.js`);
 const { readMeasure, units, writeMeasure } = await import(`${PAGE}/data/units.js`);
 const { roundLength } = await import(`${PAGE}/map/view.js`);
 
@@ -15,9 +15,9 @@ function field(measure) {
 test("lengths are written in feet and speeds in kilometres per hour", () => {
   assert.equal(length(3.048), "10.00 ft");
   assert.equal(coordinate(335.28), "1100");
-  assert.equal(sigma(-0.001), "0.00");
+  assert.equal(half(-0.001), "0.00");
   assert.equal(distance(3048), "10000 ft");
-  assert.equal(ellipse(3.048, 1.524), "10.00 × 5.00 ft");
+  assert.equal(accuracy(4.572, 1.524), "± 15.0 ft along, ± 5.00 ft across");
   assert.equal(place(3.048, -3.048, 1), "10.0, −10.0 ft");
   assert.equal(speed(10), "36.00 km/h");
   assert.equal(length(NaN), "–");

@@ -8,7 +8,7 @@ from typing import Any
 
 from dropanchor_schemas.zones import Circle, Polygon, Zone
 from dropanchor_service.api.app import DASHBOARD
-from dropanchor_service.api.routes.event_parts import EventParts
+from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.events.site_watch import WatchedSite
 from dropanchor_service.events.thread import EventThread, Retention
 from dropanchor_service.events.watcher import Watcher
@@ -31,9 +31,9 @@ class ZonePlace(Place):
         for zone in zones:
             self.parts.items.zones.put(zone.id, zone)
 
-    def go(self, tag: str, x: float, y: float) -> None:
+    def go(self, tag: str, x: float, y: float, **fields: Any) -> None:
         """Move a tag, and judge the zones."""
-        self.move(tag, x=x, y=y)
+        self.move(tag, x=x, y=y, **fields)
         self.watch.turn()
 
     @property

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { newId } from "../../../service/dropanchor_service/dashboard/zones/editor.js";
-import { newestFirst } from "../../../service/dropanchor_service/dashboard/zones/event_log.js";
+import { newestFirst, retractedBy } from "../../../service/dropanchor_service/dashboard/zones/event_log.js";
 import { handlesOf, movedTo, placeIn, withCorner, withoutCorner } from "../../../service/dropanchor_service/dashboard/zones/shape_edit.js";
 import { clock, probability, sentence } from "../../../service/dropanchor_service/dashboard/zones/words.js";
 
@@ -22,6 +22,12 @@ test("every type of event has a sentence", () => {
   };
   for (const [type, text] of Object.entries(sentences)) assert.equal(sentence(event(`dropanchor.${type}`)), text);
   assert.equal(sentence(event("dropanchor.zone.enter", { name: "" })), "a entered yard");
+});
+
+test("an event that is not true is struck through, and the one that says so says why", () => {
+  const retraction = event("dropanchor.event.retracted", { retracts: "5f", reason: "start_denied" });
+  assert.equal(sentence(retraction), "Retracted for a in Yard: the ranges contradict its start");
+  assert.deepEqual([...retractedBy([retraction, event("dropanchor.zone.enter")])], [["5f", "start_denied"]]);
 });
 
 test("a probability is never rounded up to one", () => {
@@ -62,8 +68,9 @@ test("a circle is moved by its centre and sized by its edge", () => {
 });
 
 test("the place that a refusal names is found", () => {
-  assert.deepEqual(placeIn("The edges cross or touch each other near (1.5, -2): put …"), [1.5, -2]);
-  assert.equal(placeIn("The corners do not enclose an area"), null);
+  const refusal = (values) => ({ type: "", detail: "", detail_phrase: { code: "at", values } });
+  assert.deepEqual(placeIn(refusal({ "what.place": "1.5, -2" })), [1.5, -2]);
+  assert.equal(placeIn(refusal({ "what.area": "0.01" })), null);
 });
 
 test("the id of a new zone is made of its name and is free", () => {

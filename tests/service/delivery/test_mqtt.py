@@ -23,6 +23,7 @@ from service.delivery.names import resolve_to_loopback
 from support.certificate import self_signed
 from support.delivery import LOOPBACK, DeliveryBench, in_order
 from support.mosquitto import PROGRAM, Mosquitto, mosquitto, needs_mosquitto
+from support.patience import PATIENCE_S
 from support.zenoh_router import wait_until
 
 pytestmark = needs_mosquitto
@@ -189,10 +190,12 @@ def test_a_broker_whose_name_stands_for_an_address_inside_gets_nothing_unless_th
         put(bench, topic="t")
         with bench.thread:
             bench.happen("a")
-            wait_until(lambda: "127.0.0.1, which is not public" in (bench.thread.problem_of(0, "mes") or ""))
+            wait_until(
+                lambda: "127.0.0.1, which is the machine of the service" in (bench.thread.problem_of(0, "mes") or "")
+            )
         connection, _ = listener.accept()
         with connection:
-            connection.settimeout(10)
+            connection.settimeout(PATIENCE_S)
             assert connection.recv(100) == b""
     with mosquitto(tmp_path) as broker:
         for server, networks in (("localhost", ()), ("broker.example.com", LOOPBACK)):

@@ -18,6 +18,7 @@ from dropanchor_service.delivery.channel import Outcome, Verdict
 from dropanchor_service.delivery.signature import headers
 from dropanchor_service.security.authority import Authority, Issued
 from support.delivery import SECRET, DeliveryBench, in_order
+from support.patience import PATIENCE_S
 from support.receiver import Receiver, running_receiver
 from support.zenoh_router import wait_until
 
@@ -105,7 +106,7 @@ def test_a_name_whose_server_does_not_answer_delays_no_other(monkeypatch: pytest
 
     def resolving(url: httpx.URL) -> list[str]:
         if url.port == slow.port:
-            is_over.wait(30.0)
+            is_over.wait(PATIENCE_S)
         return ["127.0.0.1"]
 
     monkeypatch.setattr("dropanchor_service.delivery.webhook.resolved", resolving)
@@ -113,7 +114,7 @@ def test_a_name_whose_server_does_not_answer_delays_no_other(monkeypatch: pytest
         bench.hook(slow, "slow")
         for _ in range(3):
             bench.happen(*map(str, range(40)))
-            wait_until(lambda: bench.counts() == (0, 0), 5.0)
+            wait_until(lambda: bench.counts() == (0, 0), PATIENCE_S / 4)
             wait_until(lambda: bench.thread.problem_of(0, "slow") == "there was no answer within 0.3 s")
         is_over.set()
 

@@ -52,6 +52,14 @@ def test_between_two_poses_headings_turn_the_short_way_and_the_lesser_claim_coun
     assert float(middle["p_mode"]) == 0.6
 
 
+def test_between_two_floors_the_height_is_as_uncertain_as_when_the_lift_leaves() -> None:
+    before, after = pose(0.0, z=1.0, z_std=0.2), pose(2.0, z=5.0, z_std=0.3)
+    middle = interpolated(before, after, 500_000_000)
+    heights = np.repeat([1.0 - 0.2, 1.0 + 0.2, 5.0 - 0.3, 5.0 + 0.3], [3, 3, 1, 1])  # a quarter has left
+    assert middle["z"] == pytest.approx(heights.mean())
+    assert middle["z_std"] == pytest.approx(heights.std())
+
+
 def test_a_bridge_is_as_uncertain_as_a_motion_of_constant_acceleration_over_its_gap() -> None:
     rng = np.random.default_rng(5)
     before, after = pose(0.0, cov=np.zeros((3, 3))), pose(4.0, x=8.0, cov=np.zeros((3, 3)))

@@ -3,6 +3,8 @@
 import time
 
 from dropanchor_schemas.zones import Circle, TooCloseRule, Zone
+from dropanchor_service.events.thread import PRUNE_S
+from dropanchor_service.store.starts import StartNews, StartPhase
 from support.events import EventBench
 from support.zenoh_router import wait_until
 
@@ -43,3 +45,13 @@ def test_turns_follow_poses_and_edits_and_go_on_while_a_rule_needs_time() -> Non
         assert turns.in_a_while() <= 1
         bench.put(rules=[TooCloseRule(id="a", type="too_close", distance_m=9.0, delay_s=0.0)])
         wait_until(lambda: turns.in_a_while() >= 2)
+
+
+def test_what_becomes_of_a_start_wakes_the_thread_though_no_pose_changes() -> None:
+    bench = EventBench()
+    turns = CountingTurns(bench)
+    bench.poses.move("cart", x=1.0)
+    with bench.thread:
+        wait_until(lambda: turns.count == 1)
+        bench.poses.answers.tags.rows.start_news.append(StartNews(0, StartPhase.TOLD))
+        wait_until(lambda: turns.count == 2, PRUNE_S / 2)  # then it would wake by itself

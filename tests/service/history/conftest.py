@@ -44,7 +44,7 @@ def shared_database(postgresql: Postgresql) -> str:
     return postgresql.new_database()
 
 
-@pytest.fixture(params=["file", pytest.param("database", marks=needs_postgresql)])
+@pytest.fixture(params=["file", pytest.param("database", marks=(needs_postgresql, pytest.mark.outside))])
 def any_place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Place]:
     """A history that does not exist yet, in a file and then in a database."""
     if request.param == "file":

@@ -13,7 +13,7 @@ from dropanchor_service.estimation.columns import POSE
 from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.sqlite.store import FILE_NAME, SqliteStorage
 from dropanchor_service.history.tracks import Tracks
-from dropanchor_service.persistence import retention_of
+from dropanchor_service.persistence.site import retention_of
 from dropanchor_service.runtime.recovery import MAX_ASIDE, Recovery
 from dropanchor_service.settings.history import HistorySettings
 from dropanchor_service.store import SiteStore, TagTable

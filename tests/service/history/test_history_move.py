@@ -10,7 +10,7 @@ import pytest
 from dropanchor_service.cli import main
 from dropanchor_service.commands import history_move as moving
 from dropanchor_service.commands.history_move import HistoryFile, Moved, move
-from dropanchor_service.estimation.columns import Frame, State
+from dropanchor_service.estimation.columns import Frame, HeightSource, State
 from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.postgresql.database import Database
 from dropanchor_service.history.postgresql.schema import SCHEMA
@@ -31,7 +31,10 @@ def filled(path: Path) -> FilePlace:
     place = FilePlace(path)
     writer = place.writer()
     lost = drive(SECONDS, speed=1.0, state=State.COASTING, frame=Frame.RELATIVE)
-    for tag, poses in (("cart", drive(SECONDS, heading=0.5, sigma_pos=0.1)), ("truck 7", lost)):
+    for tag, poses in (
+        ("cart", drive(SECONDS, heading=0.5, sigma_pos=0.1, z=1.5, z_source=HeightSource.PRESSURE)),
+        ("truck 7", lost),
+    ):
         anchors = ["1" if t_ns < T_NS + 1000 * SECOND else None for t_ns in poses["t_ns"]]
         writer.insert(poses, [tag] * len(poses), anchors)
     summarise(writer)
@@ -125,7 +128,7 @@ def test_a_move_that_is_killed_while_it_writes_is_complete_after_the_next_one(
         with postgresql.connect(url) as connection, connection.transaction():
             connection.execute(f"LOCK TABLE {SCHEMA}.poses IN EXCLUSIVE MODE")
             with Popen(command(*words), env=environment(), stderr=DEVNULL) as killed:
-                wait_until(lambda: postgresql.run(url, waits), 120.0)
+                wait_until(lambda: postgresql.run(url, waits))
                 killed.kill()
         assert there.reader.tags() == ["cart"]
         assert main(words) == 0
@@ -159,5 +162,5 @@ def test_another_kind_of_file_is_refused(tmp_path: Path) -> None:
     with sqlite3.connect(other) as connection:
         connection.execute("PRAGMA user_version = 9")
     connection.close()
-    with pytest.raises(HistoryError, match="has schema version 9, but this version reads 1 to 3"):
+    with pytest.raises(HistoryError, match="has schema version 9, but this version reads 1 to 4"):
         HistoryFile(other)

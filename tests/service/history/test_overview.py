@@ -5,7 +5,7 @@ import sqlite3
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.columns import POSE, Array, Frame, State
+from dropanchor_service.estimation.columns import POSE, Array, Frame, HeightSource, State
 from dropanchor_service.history.errors import TooMuchError, UnfinishedSummaryError
 from dropanchor_service.history.overview import Overview
 from dropanchor_service.history.summaries import Between
@@ -208,6 +208,20 @@ def test_a_period_with_too_many_summaries_is_refused_with_a_reason(
     with pytest.raises(TooMuchError, match="name the tags"):
         overview(place, 0, 60 * HOUR)
     assert figures(overview(place, 0, 20 * HOUR), "a")["poses"] == 1201
+
+
+def test_points_have_the_heights_of_their_poses_from_poses_and_summaries(
+    any_place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seconds = np.arange(0.0, HOUR, 10.0)
+    climb = drive(seconds, z=seconds / 100, z_std=0.25, z_source=HeightSource.PRESSURE)
+    store(any_place, a=climb).close()
+    for poses in (200_000, 0):  # one by one, and from summaries
+        monkeypatch.setattr("dropanchor_service.history.overview.MAX_POSES", poses)
+        found = points(overview(any_place, 0, HOUR), "a")["point"]
+        np.testing.assert_allclose(found["z"], (found["t_ns"] - T_NS) / SECOND / 100, rtol=1e-6)
+        assert set(found["z_std"].tolist()) == {0.25}
+        assert set(found["z_source"].tolist()) == {HeightSource.PRESSURE}
 
 
 def test_a_file_without_summaries_gets_them(place: FilePlace) -> None:

@@ -23,6 +23,7 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.store import SiteStore, TagTable
 from service.history.test_overview import HOUR, SECOND, T_NS, drive, figures, overview, summarise
 from support.history_places import DatabasePlace, count_written, opened
+from support.patience import PATIENCE_S
 from support.postgresql import Postgresql, needs_postgresql
 
 pytestmark = needs_postgresql
@@ -75,13 +76,19 @@ def test_sites_of_one_database_know_nothing_of_each_other(database: Database, ur
         place.writer().insert(drive(np.array([0.0, 1.0]), x=x), ["cart", "cart"], ["17", None])
     assert [place.reader.poses("cart", T_NS, T_NS, 9).poses["x"].tolist() for place in (north, south)] == [[1], [2]]
     assert [sorted(place.reader.tags()) for place in (north, south)] == [["cart"], ["cart"]]
+    assert north.reader.coverage(T_NS - 25 * SECOND, T_NS + 99 * SECOND, 100).stretches == [(T_NS, T_NS + 10 * SECOND)]
+    assert north.reader.coverage(T_NS - 25 * SECOND, T_NS - SECOND, 100).stretches == []
     assert DatabasePlace(database, "nowhere").reader.tags() == []
+    assert DatabasePlace(database, "nowhere").reader.coverage(0, T_NS, 100).stretches == []
     rows = postgresql.run(url, "SELECT site, tag, x, state FROM dropanchor_history.tracks ORDER BY x, t_ns")
     assert rows == [("north", "cart", 1.0, "tracking")] * 2 + [("Lager Süd", "cart", 2.0, "tracking")] * 2
 
 
-OLD_VIEW = """
+TO_VERSION_1 = """
 DROP VIEW dropanchor_history.tracks;
+ALTER TABLE dropanchor_history.poses DROP COLUMN z, DROP COLUMN z_std_m, DROP COLUMN z_source;
+UPDATE dropanchor_history.schema_version SET version = 1;
+UPDATE dropanchor_history.stretches SET summaries = '\\x00' WHERE summaries != '\\x';
 CREATE VIEW dropanchor_history.tracks AS SELECT sites.name AS site, tags.name AS tag,
     to_timestamp(p.t_ns / 1e9) AS time, p.t_ns, 'tracking' AS state, p.relative, p.x, p.y, p.heading_rad, p.speed_mps,
     p.sigma_pos_m FROM dropanchor_history.poses p JOIN dropanchor_history.tags ON tags.id = p.tag
@@ -102,10 +109,31 @@ def test_the_view_never_shows_a_place_in_a_frame_of_the_tags_own_as_one_of_the_s
     (state, *of_site, own), placed = postgresql.run(url, query)
     assert (state, of_site, own) == ("relative", [None] * 4, 2.0)
     assert (placed[0], placed[1], placed[5]) == ("tracking", 2.0, None)
-    postgresql.run(url, OLD_VIEW)
+    postgresql.run(url, TO_VERSION_1)
     with opened(url, NOW_NS) as database:
         DatabasePlace(database, "yard").writer().insert(drive(np.array([2.0])), ["a"], [None])
     assert postgresql.run(url, query)[:2] == [(state, *of_site, own), placed]
+
+
+def test_tables_from_before_heights_are_read_and_continued(url: str, postgresql: Postgresql) -> None:
+    seconds = np.arange(0.0, HOUR, 10.0)
+    with opened(url, NOW_NS) as database:
+        writer = DatabasePlace(database, "yard").writer()
+        writer.insert(drive(seconds), ["a"] * len(seconds), [None] * len(seconds))
+        summarise(writer)
+    postgresql.run(url, TO_VERSION_1)
+    with opened(url, NOW_NS) as database:
+        place = DatabasePlace(database, "yard")
+        with pytest.raises(HistoryError, match="schema version 1"):  # until somebody writes
+            place.reader.span()
+        writer = place.writer()
+        writer.insert(drive(np.array([float(HOUR)]), z=4.0, z_std=0.25), ["a"], [None])
+        summarise(writer)
+        found = place.reader.poses("a", 0, 2**62, 999).poses
+        assert (np.isnan(found["z"][:-1]).all(), found["z"][-1], len(found)) == (True, 4.0, 361)
+        assert figures(overview(place, 0, 720 * HOUR), "a")["poses"] == 361
+    heights = postgresql.run(url, "SELECT z, z_std_m FROM dropanchor_history.tracks ORDER BY t_ns")
+    assert heights == [(None, None)] * 360 + [(4.0, 0.25)]
 
 
 def test_a_stored_pose_tells_the_epoch_of_the_process_that_wrote_it(database: Database) -> None:
@@ -267,7 +295,7 @@ def test_a_history_of_a_later_version_is_refused_and_not_changed(
     assert write(tracks, NOW_NS)
     database.close()
     postgresql.run(url, "UPDATE dropanchor_history.schema_version SET version = 99")
-    refusal = "has schema version 99, but this service needs 1: update the service, or name another database"
+    refusal = "has schema version 99, but this service needs 2: update the service, or name another database"
     assert not write(tracks, NOW_NS + SECOND)
     assert tracks.problems[0].endswith(refusal)
     with pytest.raises(HistoryError, match="schema version 99"):
@@ -294,7 +322,7 @@ def test_two_services_may_write_the_same_site_and_no_summary_lacks_a_pose(url: s
     for service in services:
         service.start()
     for service in services:
-        service.join(60)
+        service.join(PATIENCE_S)
     assert failed == []
     with opened(url) as database:
         place = DatabasePlace(database, "yard")

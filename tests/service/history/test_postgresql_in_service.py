@@ -13,10 +13,10 @@ from dropanchor_service.estimation.columns import POSE, State
 from dropanchor_service.history.postgresql.database import Database
 from dropanchor_service.history.storage import Retention
 from dropanchor_service.metrics.registry import Metrics
-from dropanchor_service.persistence import Persistence, open_database, open_sites
+from dropanchor_service.persistence.site import Persistence, open_database, open_sites
+from dropanchor_service.persistence.site_folders import SiteFolders
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError, load_settings
-from dropanchor_service.site_folders import SiteFolders
 from support.api import T_NS, ApiBench, ask, kind_of, make_api_bench
 from support.history_places import opened
 from support.postgresql import Postgresql, needs_postgresql
@@ -49,6 +49,7 @@ def driven(bench: ApiBench) -> ApiBench:
     "path",
     [
         "history",
+        "history/coverage?max_parts=50",
         "tracks?max_points=50",
         "tracks?tags=b",
         "heat-map?cell_m=1",

@@ -1,13 +1,14 @@
 """The history's file stores poses, prunes them and survives failed writes and kills."""
 
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.columns import POSE, Array, Frame, State
+from dropanchor_service.estimation.columns import POSE, Array, Frame, HeightSource, State
 from dropanchor_service.history.reader import TrackReader
 from dropanchor_service.history.sqlite.track_file import FileReader, TrackFileError, TrackWriter
 from support.history_places import Place
@@ -53,6 +54,53 @@ def test_a_pose_keeps_its_state_and_its_frame(any_place: Place) -> None:
     found = reader.poses("a", T_NS, T_NS + 60 * SECOND, 10).poses
     assert found["state"].tolist() == [State.TRACKING, State.DEGRADED]
     assert found["frame"].tolist() == [Frame.RELATIVE, Frame.SITE]
+    writer.close()
+
+
+def test_a_pose_keeps_its_height_and_where_that_comes_from(any_place: Place) -> None:
+    writer, reader = any_place.writer(), any_place.reader
+    made = poses(0, 1)
+    made["z"], made["z_std"], made["z_source"] = [3.5, np.nan], [0.25, np.nan], HeightSource.PRESSURE
+    writer.insert(made, ["a", "a"], [None, None])
+    found = reader.poses("a", T_NS, T_NS + 60 * SECOND, 10).poses
+    np.testing.assert_array_equal(found["z"], [3.5, np.nan])
+    np.testing.assert_array_equal(found["z_std"], [0.25, np.nan])
+    assert found["z_source"].tolist() == [HeightSource.PRESSURE] * 2
+    writer.close()
+
+
+def without_heights(path: Path) -> None:
+    """Make the file one of version 3, whose records end before their height."""
+    with closing(sqlite3.connect(path)) as old:
+        old.execute("UPDATE poses SET pose = substr(pose, 1, 66)")
+        old.execute(
+            "UPDATE summaries SET tags = X'00' WHERE tags != X''"
+        )  # summaries of version 3 are of another length
+        old.execute("PRAGMA user_version = 3")
+        old.commit()
+
+
+def test_a_file_from_before_heights_is_read_and_continued(tmp_path: Path) -> None:
+    path = tmp_path / "h.sqlite"
+    writer, reader = TrackWriter(path), FileReader(path)
+    writer.insert(poses(*range(300), x=7.0), ["a"] * 300, [None] * 300)
+    while writer.summarise():
+        pass
+    writer.close()
+    without_heights(path)
+    old = reader.poses("a", T_NS, T_NS + 600 * SECOND, 1000).poses
+    assert (old["x"].tolist(), np.isnan(old["z"]).all()) == ([7.0] * 300, True)
+    writer, new = TrackWriter(path), poses(300, x=8.0)
+    new["z"], new["z_std"] = 2.0, 0.5
+    writer.insert(new, ["a"], [None])
+    for _ in range(3):
+        while writer.summarise():
+            pass
+    found = reader.poses("a", T_NS, T_NS + 600 * SECOND, 1000).poses
+    assert (len(found), np.isnan(found["z"][:300]).all(), found["z"][300]) == (301, True, 2.0)
+    overview = reader.overview(None, T_NS, T_NS + 600 * SECOND, 1000)
+    assert (overview.figures["poses"].tolist(), overview.points["point"]["z"][-1]) == ([301], 2.0)
+    assert np.isnan(overview.points["point"]["z"][0])
     writer.close()
 
 

@@ -12,6 +12,7 @@ from dropanchor_tag_client.recording import read_recording
 from service.importing import formats
 from service.importing.command import Import
 from support.commands import start_python
+from support.patience import PATIENCE_S
 
 TABLE = "t,anchor,range\n0.0,A,5.5\n0.1,A,5.25\n"
 
@@ -120,7 +121,7 @@ def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path) -> None:
             assert process.poll() is None, "it ended before it wrote"
             time.sleep(0.002)
         process.send_signal(signal.SIGINT)
-        _, error = process.communicate(timeout=30)
+        _, error = process.communicate(timeout=PATIENCE_S)
     finally:
         with suppress(ProcessLookupError):
             process.kill()

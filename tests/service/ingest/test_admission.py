@@ -55,7 +55,7 @@ def test_a_flood_of_unknown_tags_is_bounded_and_does_not_harm_registered_tags() 
 
 
 def test_a_tag_gets_its_row_with_its_second_message_if_many_are_new_and_loses_none() -> None:
-    bench = IngestBench(unproven_tags=1)
+    bench = IngestBench(max_unconfirmed_tags=1)
     bench.send("quick", ranges(1.0))
     bench.put("slow", ranges(2.0, sequence=0, boot_id=5), at_ns=T)
     bench.ingest.turn()
@@ -70,7 +70,7 @@ def test_a_tag_gets_its_row_with_its_second_message_if_many_are_new_and_loses_no
 
 
 def test_a_duplicated_or_unreadable_message_does_not_confirm_a_tag() -> None:
-    bench = IngestBench(unproven_tags=0)
+    bench = IngestBench(max_unconfirmed_tags=0)
     for _ in range(3):
         bench.put("doubled", ranges(1.0), at_ns=T)
     for second in range(3):
@@ -82,7 +82,7 @@ def test_a_duplicated_or_unreadable_message_does_not_confirm_a_tag() -> None:
 
 
 def test_confirmed_tags_make_room_for_other_unlisted_ones() -> None:
-    bench = IngestBench(unproven_tags=1)
+    bench = IngestBench(max_unconfirmed_tags=1)
     bench.put("first", ranges(1.0), at_ns=T)
     bench.put("waits", ranges(2.0), at_ns=T)
     bench.ingest.turn()
@@ -94,7 +94,7 @@ def test_confirmed_tags_make_room_for_other_unlisted_ones() -> None:
 
 
 def test_tags_that_send_once_are_dropped_and_all_of_their_messages_are_counted() -> None:
-    bench = IngestBench(max_tags=100, unproven_tags=10)
+    bench = IngestBench(max_tags=100, max_unconfirmed_tags=10)
     for number in range(5_000):
         bench.put(f"unlisted{number}", ranges(1.0))
         if number % 200 == 0:
@@ -103,7 +103,7 @@ def test_tags_that_send_once_are_dropped_and_all_of_their_messages_are_counted()
     bench.ingest.turn()
     assert len(bench.tags) == 10
     assert len(bench.pending_tags) == 100
-    assert bench.rejected() == {"tag_unproven": 5_000 - 10 - 100}
+    assert bench.rejected() == {"tag_unconfirmed": 5_000 - 10 - 100}
 
 
 def test_a_quarantined_tag_is_pending_until_its_settings_are_put() -> None:
@@ -157,7 +157,7 @@ def test_samples_that_were_pending_when_their_tag_was_deleted_make_no_pose() -> 
 
 
 def test_messages_kept_for_a_tag_are_used_when_rest_registers_it() -> None:
-    bench = IngestBench(unproven_tags=0)
+    bench = IngestBench(max_unconfirmed_tags=0)
     bench.put("a", ranges(1.0), at_ns=T)
     bench.ingest.turn()
     bench.tags.register("a")  # as REST does

@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from dropanchor_service.ingest.decode import Forms
 from dropanchor_service.ingest.kernels.packed import FORM
+from dropanchor_service.ingest.messages import Messages
 from dropanchor_service.ingest.publishers import Publishers
 
 S = 1_000_000_000
@@ -34,11 +36,12 @@ class Tag:
             forms[name] = value
         self.sent[boot_id] = self.sent.get(boot_id, 0) + 1
         arrival = np.array([true_ns + delay_ns])
-        sequenced = self.publishers.sequence(forms, zero, arrival, 0)
+        messages = Messages(Forms(forms), zero, arrival, waited=1)
+        sequenced = self.publishers.sequence(messages, 0)
         times = [
             (zero, np.array([true_ns + error_ns])) if kind in kinds else (zero[:0], arrival[:0]) for kind in range(2)
         ]
-        self.publishers.time_offsets(forms, sequenced, arrival, times)
+        self.publishers.time_offsets(messages, sequenced, times)
 
     def send_apart(self, seconds: float, error_ns: int, begin_s: float = 0.0, **form: bool) -> None:
         """Send motion from a clock with this error, and ranges from one that is right."""

@@ -7,7 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from dropanchor_service.ingest.decode import Forms
 from dropanchor_service.ingest.kernels.packed import FORM
+from dropanchor_service.ingest.messages import Messages
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.runtime.clock import UtcClock
 
@@ -39,9 +41,10 @@ class Tag:
         form["boot_id"], form["sequence"], form["boot_clock"] = self._boot_id, self._sequence, self._boot_clock
         self._sequence += 1
         arrival = np.array([true_ns + delay_ns])
-        sequenced = self._publishers.sequence(form, zero, arrival, 0)
+        messages = Messages(Forms(form), zero, arrival, waited=1)
+        sequenced = self._publishers.sequence(messages, 0)
         own_ns = true_ns + error_ns
-        offsets = self._publishers.time_offsets(form, sequenced, arrival, [(zero, np.array([own_ns]))])
+        offsets = self._publishers.time_offsets(messages, sequenced, [(zero, np.array([own_ns]))])
         self.jumps += offsets.jumps
         self.estimator_ns = own_ns + int(offsets.messages.sum())
         pose = np.array([(0, self.estimator_ns)], [("row", "i4"), ("t_ns", "i8")])

@@ -5,8 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from dropanchor_service.ingest.decode import Forms
 from dropanchor_service.ingest.kernels.packed import FORM
 from dropanchor_service.ingest.kernels.sequences import PER_TAG, WINDOW
+from dropanchor_service.ingest.messages import Messages
 from dropanchor_service.ingest.publishers import Publishers, Sequenced
 
 S = 1_000_000_000
@@ -24,9 +26,8 @@ def forms_of(numbers: Sequence[int], boot_id: int = BOOT) -> np.ndarray:
 def put(publishers: Publishers, numbers: Sequence[int], boot_id: int = BOOT, due: bool = False) -> Sequenced:
     """Put messages of one tag that arrive at 1 s. due: none of them waits any longer."""
     n = len(numbers)
-    return publishers.sequence(
-        forms_of(numbers, boot_id), np.full(n, ROW, np.int32), np.full(n, S), S if due else S - 1
-    )
+    messages = Messages(Forms(forms_of(numbers, boot_id)), np.full(n, ROW, np.int32), np.full(n, S), waited=n)
+    return publishers.sequence(messages, S if due else S - 1)
 
 
 def passed(publishers: Publishers, numbers: Sequence[int], due: bool = False) -> list[int]:
@@ -61,7 +62,7 @@ def test_a_due_message_releases_those_before_it_but_not_those_behind_the_next_ga
     publishers = Publishers()
     assert passed(publishers, [0]) == [0]
     numbers, arrivals = [8, 5, 3], np.array([S + 9, S, S + 9])
-    released = publishers.sequence(forms_of(numbers), np.zeros(3, np.int32), arrivals, S)
+    released = publishers.sequence(Messages(Forms(forms_of(numbers)), np.zeros(3, np.int32), arrivals, waited=3), S)
     assert [numbers[index] for index in released.due.tolist()] == [3, 5]
     assert [numbers[index] for index in released.pending.tolist()] == [8]
 
@@ -119,7 +120,9 @@ def test_publishers_and_tags_do_not_wait_for_each_other() -> None:
     publishers = Publishers()
     assert put(publishers, [0, 2], boot_id=1).due.tolist() == [0]
     assert put(publishers, [0, 1], boot_id=2).due.tolist() == [0, 1]
-    assert publishers.sequence(forms_of([0]), np.array([5], np.int32), np.array([S]), 0).due.tolist() == [0]
+    assert publishers.sequence(
+        Messages(Forms(forms_of([0])), np.array([5], np.int32), np.array([S]), waited=1), 0
+    ).due.tolist() == [0]
 
 
 def test_new_boot_ids_replace_the_publisher_that_was_silent_for_longest() -> None:
@@ -127,7 +130,8 @@ def test_new_boot_ids_replace_the_publisher_that_was_silent_for_longest() -> Non
     for boot_id in range(2, 1000):
         for number, one in ((boot_id - 2, 1), (0, boot_id)):
             arrivals = np.array([S * boot_id + (one == 1)])
-            released = publishers.sequence(forms_of([number], one), np.zeros(1, np.int32), arrivals, 0)
+            messages = Messages(Forms(forms_of([number], one)), np.zeros(1, np.int32), arrivals, waited=1)
+            released = publishers.sequence(messages, 0)
             assert released.due.tolist() == [0]
     assert len(publishers.columns) == PER_TAG
 

@@ -10,6 +10,7 @@ from dropanchor_schemas.wire import (
     Frame,
     HeadingSample,
     ImuSample,
+    PressureSample,
     RangeSample,
     Reason,
     encode_packed,
@@ -80,6 +81,23 @@ def test_bad_angles_are_counted(value: float, std: float, reason: Reason | None)
     _, bearing = screened(Frame(bearings=[BearingSample(T, 7, value, std)]))
     assert [r.reason for r in heading] == [reason or Reason.HEADING_ABSURD]
     assert [r.reason for r in bearing] == [reason or Reason.BEARING_ABSURD]
+
+
+@pytest.mark.parametrize(
+    ("pressure_pa", "temperature_c", "reason"),
+    [
+        (1_013.25, NAN, Reason.PRESSURE_NOT_PA),
+        (101.325, NAN, Reason.PRESSURE_NOT_PA),
+        (110_001.0, NAN, Reason.PRESSURE_ABSURD),
+        (101_325.0, 294.65, Reason.TEMPERATURE_ABSURD),
+        (NAN, 21.5, Reason.NOT_FINITE),
+    ],
+)
+def test_a_pressure_in_another_unit_is_named(pressure_pa: float, temperature_c: float, reason: Reason) -> None:
+    good = PressureSample(T, 101_325.0, 21.5)
+    kept, rejected = screened(Frame(pressures=[good, PressureSample(T, pressure_pa, temperature_c), good]))
+    assert [(r.reason, r.kind, len(r.messages)) for r in rejected] == [(reason, "pressure", 1)]
+    assert kept.pressures["value"].tolist() == [101_325.0] * 2
 
 
 def test_a_sample_with_several_errors_is_counted_once() -> None:

@@ -98,7 +98,7 @@ def test_quotas_and_tags_in_quarantine_are_of_their_site() -> None:
     bench = bench_of(
         (Site(id="a"), Quota(max_tags=1)),
         (Site(id="b"), Quota(unknown_tags="quarantine")),
-        (Site(id="c"), Quota(unproven_tags=1)),
+        (Site(id="c"), Quota(max_unconfirmed_tags=1)),
     )
     for site in "abc":
         for tag in ("first", "second"):

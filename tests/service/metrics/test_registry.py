@@ -54,6 +54,6 @@ def test_tags_are_counted_by_their_aged_state_rather_than_the_stored_one() -> No
     }
     assert states == dict.fromkeys(states, 1)
     assert found["dropanchor_tags_registered"] == 4
-    assert found["dropanchor_newcomers"] == 1
+    assert found["dropanchor_tags_pending"] == found["dropanchor_newcomers"] == 1
     assert found["dropanchor_tags_online"] == 1
     assert found["dropanchor_queue_messages"] == 5

@@ -40,7 +40,7 @@ def test_a_node_listens_on_the_network_only_with_credentials(tmp_path: Path) -> 
 
 
 def test_a_node_that_never_reached_the_database_is_not_ready_and_has_the_page(tmp_path: Path) -> None:
-    with Node(settings_of(tmp_path)) as node, httpx.Client(base_url=node.url, trust_env=False) as client:
+    with Node(settings_of(tmp_path)) as node, httpx.Client(base_url=node.url, trust_env=False, verify=False) as client:
         wait_until(lambda: "connection" in client.get("/api/v1/health/ready").text)
         assert client.get("/api/v1/health/ready").status_code == 503
         refused = client.get("/api/v1/sites/017.yard/poses")

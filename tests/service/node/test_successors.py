@@ -20,6 +20,7 @@ from dropanchor_service.node.owners import Owner
 from support.api import kind_of
 from support.api_nodes import BareNode, running_owner
 from support.http_server import running_server
+from support.patience import PATIENCE_S
 from support.sites import app_of_sites, make_sites
 from support.zenoh_router import free_port, wait_until
 
@@ -53,7 +54,7 @@ def node_before(owner: Owner) -> Iterator[tuple[BareNode, httpx.Client]]:
     node = BareNode()
     with (
         node.running(Owner("yard", 1, "first", "")) as url,
-        httpx.Client(base_url=url, trust_env=False, timeout=20.0) as client,
+        httpx.Client(base_url=url, trust_env=False, verify=False) as client,
     ):
         node.take(owner)
         yield node, client
@@ -166,12 +167,12 @@ def test_a_web_socket_ends_when_its_site_has_a_new_owner() -> None:
     with running_owner(app, "yard", 2) as owner, node_before(owner) as (node, client):
         url = f"ws{str(client.base_url).removeprefix('http').rstrip('/')}/api/v1/ingest/stream?tag=anna"
         with connect(url, proxy=None) as socket:
-            socket.recv(timeout=10.0)
+            socket.recv(PATIENCE_S)
             node.take(Owner("yard", 3, "b", owner.address))
             with pytest.raises(ConnectionClosed) as closed:
-                socket.recv(timeout=10.0)
+                socket.recv(PATIENCE_S)
         with connect(url, proxy=None) as socket, pytest.raises(ConnectionClosed) as refused:
-            socket.recv(timeout=10.0)
+            socket.recv(PATIENCE_S)
     for end in (closed, refused):
         assert end.value.rcvd is not None
         assert (end.value.rcvd.code, end.value.rcvd.reason) == (1012, "yard has another owner now. Connect again.")

@@ -13,6 +13,7 @@ from support.api import kind_of
 from support.api_nodes import BareNode, of_owner
 from support.certificate import self_signed
 from support.http_server import running_server
+from support.patience import PATIENCE_S
 from support.sites import app_of_sites, make_sites
 
 POSE = "/api/v1/tags/cart/pose"
@@ -25,8 +26,8 @@ def test_an_owner_needs_a_certificate_that_the_node_trusts(tmp_path: Path) -> No
     with running_server(app, Event(), certificate=certificate) as port:
         owner = Owner("yard", 1, "a", f"https://127.0.0.1:{port}")
         with trusting.running(owner) as url, other.running(owner) as url_of_other:
-            assert httpx.get(f"{url}{POSE}", trust_env=False).json()["tag"] == "cart"
+            assert httpx.get(f"{url}{POSE}", trust_env=False, verify=False).json()["tag"] == "cart"
             with connect(f"ws{url.removeprefix('http')}/api/v1/ingest/stream?tag=anna", proxy=None) as socket:
-                assert json.loads(socket.recv(timeout=10.0))["tag"] == "anna"
-            refused = httpx.get(f"{url_of_other}{POSE}", trust_env=False)
+                assert json.loads(socket.recv(PATIENCE_S))["tag"] == "anna"
+            refused = httpx.get(f"{url_of_other}{POSE}", trust_env=False, verify=False)
     assert (kind_of(refused), "cannot be reached" in refused.text) == ("not-ready", True)

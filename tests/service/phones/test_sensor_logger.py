@@ -204,3 +204,17 @@ def test_the_charge_of_the_battery_is_reported_when_it_changes_and_now_and_then(
     reports = [json.loads(payload)["battery_fraction"] for _, payload, _ in phone.health]
     assert reports == [0.8, 0.79, 0.79]
     assert {(tag, encoding) for tag, _, encoding in phone.health} == {("anna", ENCODING_JSON)}
+
+
+def test_a_barometer_is_passed_on_in_pascals_once_and_without_waiting_for_other_sensors() -> None:
+    readings = [
+        {"name": "barometer", "time": T_NS, "values": {"pressure": 1013.25, "relativeAltitude": 0.5}},
+        {"name": "barometer", "time": str(T_NS + 40_000_000), "values": {"pressure": 1013.5, "relativeAltitude": 0.4}},
+        {"name": "barometer", "time": T_NS, "values": {"pressure": None}},
+        {"name": "barometer", "time": -1, "values": {"pressure": 1013.0}},
+    ]
+    phone = make_phone()
+    for _ in range(2):
+        phone.post(message(0, readings))
+    pressures = [sample for frame in phone.frames for sample in frame.pressures]
+    assert [sample[:2] for sample in pressures] == [(T_NS, 101_325.0), (T_NS + 40_000_000, 101_350.0)]

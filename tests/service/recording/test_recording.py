@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 
 from dropanchor_schemas.site import Anchor, Georeference, Site, TagSettings
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
-from dropanchor_service.estimation.columns import POSE, Frame, State
+from dropanchor_service.estimation.columns import POSE, Frame, HeightSource, State
 from dropanchor_service.recording import mcap_file
 from dropanchor_service.recording.folder import Limits, files_in, prune
 from dropanchor_service.recording.reading import RecordingReader, Turn
@@ -28,7 +28,7 @@ from dropanchor_tag_client.recording import RecordingError
 S = 1_000_000_000
 T_NS = 1_800_000_000 * S
 UNLIMITED = Limits(2**30, 3600 * S, 1000, 10**18, 2**40)
-SITE = Site(anchors=[Anchor(id="7", x=1.0, z=2.5)], georeference=Georeference(lat=52.5, lon=13.4))
+SITE = Site(anchors=[Anchor(id="7", x=1.0, z=2.5)], georeference=Georeference(lat=52.5, lon=13.4, alt_m=34.5))
 
 
 class RecorderBench:
@@ -51,7 +51,7 @@ class RecorderBench:
     def estimate(self, **fields: Any) -> None:
         pose = np.zeros(1, POSE)
         pose["t_ns"], pose["state"] = self.now_ns, State.TRACKING
-        pose["cov"] = np.diag([0.04, 0.01, 0.001])
+        pose["cov"], pose["z"] = np.diag([0.04, 0.01, 0.001]), np.nan
         for name, value in fields.items():
             pose[name] = value
         self.recorder.record_poses(pose)
@@ -102,11 +102,12 @@ def test_only_chosen_tags_are_recorded_and_only_while_a_recording_runs(tmp_path:
     assert not any(turn.estimates for turn in bench.turns())
 
 
-def test_poses_are_recorded_in_schemas_that_viewers_know_and_are_valid(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("z", "shown"), [(np.nan, 1.5), (6.25, 6.25)], ids=["as told", "estimated"])
+def test_poses_are_recorded_in_schemas_that_viewers_know_and_are_valid(tmp_path: Path, z: float, shown: float) -> None:
     bench = RecorderBench(tmp_path)
     bench.recorder.start()
     bench.receive()
-    bench.estimate(x=3.0, y=4.0, heading=np.pi / 2, anchor=0, range=5.0)
+    bench.estimate(x=3.0, y=4.0, z=z, z_std=0.5, z_source=HeightSource.PRESSURE, heading=np.pi / 2, anchor=0, range=5.0)
     bench.now_ns += S
     bench.estimate(x=np.nan, y=np.nan, cov=np.nan, state=State.AMBIGUOUS, anchor=-1)
     bench.recorder.stop()
@@ -121,15 +122,19 @@ def test_poses_are_recorded_in_schemas_that_viewers_know_and_are_valid(tmp_path:
                 Draft202012Validator(json.loads(schema.data)).validate(json.loads(message.data))
                 found.setdefault(schema.name, []).append(json.loads(message.data))
     pose = found["foxglove.PoseInFrame"]
-    assert pose[0]["pose"]["position"] == {"x": 3.0, "y": 4.0, "z": 1.5}
+    assert pose[0]["pose"]["position"] == {"x": 3.0, "y": 4.0, "z": shown}
     assert pose[0]["pose"]["orientation"]["z"] == pytest.approx(0.5**0.5)
     assert (len(pose), len(found["foxglove.LocationFix"]), len(found["dropanchor.Estimate"])) == (1, 1, 2)
     fix = found["foxglove.LocationFix"][0]
-    assert fix["position_covariance"] == [0.04, 0, 0, 0, 0.01, 0, 0, 0, 1e6]  # nothing says that the altitude is known
+    estimated = np.isfinite(z)
+    assert (fix["altitude"], fix["position_covariance"][8]) == ((40.75, 0.25) if estimated else (0.0, 1e6))
+    assert fix["position_covariance"][:8] == [0.04, 0, 0, 0, 0.01, 0, 0, 0]
     assert fix["position_covariance_type"] == 1
     assert found["foxglove.FrameTransform"][0]["translation"] == {"x": 1.0, "y": 0.0, "z": 2.5}
     assert found["dropanchor.Estimate"][0]["anchor"] == "7"
     assert "x" not in found["dropanchor.Estimate"][1]
+    heights = [found["dropanchor.Estimate"][0].get(name) for name in ("z", "z_std_m", "z_source")]
+    assert heights == ([6.25, 0.5, "pressure"] if estimated else [None, 0.5, None])
     assert len(found["dropanchor.PackedSamples"]) == 1
 
 

@@ -12,6 +12,7 @@ import pytest
 from dropanchor_service.engines.warm_up import CompilationProgress
 from dropanchor_service.runtime import kernel_cache
 from dropanchor_service.runtime.kernel_cache import TEMPORARY, VARIABLE, use_kernel_cache
+from support.patience import PATIENCE_S
 from support.service import environment
 
 
@@ -96,7 +97,7 @@ def test_the_folder_of_a_killed_process_is_removed_and_that_of_a_living_one_is_n
     with started(tmp_path) as killed, started(tmp_path) as living:
         left, used = folder_of(killed), folder_of(living)
         killed.send_signal(signal.SIGKILL)
-        killed.wait(30.0)
+        killed.wait(PATIENCE_S)
         assert left.exists()
         for folder in (left, used):
             long_ago = time.time() - 3600.0

@@ -7,13 +7,14 @@ from pathlib import Path
 import pytest
 
 from dropanchor_service.runtime.systemd import Systemd
+from support.patience import PATIENCE_S
 
 
 @pytest.fixture
 def manager(tmp_path: Path) -> Iterator[socket.socket]:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
         listening.bind(str(tmp_path / "notify"))
-        listening.settimeout(5.0)
+        listening.settimeout(PATIENCE_S)
         yield listening
 
 
@@ -29,7 +30,7 @@ def test_an_at_sign_marks_an_abstract_socket() -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
         listening.bind("")  # the kernel chooses an abstract name
         name = listening.getsockname()
-        listening.settimeout(5.0)
+        listening.settimeout(PATIENCE_S)
         Systemd({"NOTIFY_SOCKET": "@" + name[1:].decode()}).ready()
         assert listening.recv(100) == b"READY=1"
 

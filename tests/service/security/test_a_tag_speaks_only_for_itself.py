@@ -12,6 +12,7 @@ import zenoh.ext
 
 from dropanchor_schemas import keys
 from dropanchor_tag_client import ConnectError, SessionSettings, TagClient, read_credentials
+from support.patience import PATIENCE_S
 from support.secured import SecuredSite, secured_site
 from support.zenoh_router import wait_until
 
@@ -64,7 +65,9 @@ class World:
             self.reader.declare_subscriber(keys.all_tags(SITE, "pose"), self.poses),
             self.reader.declare_subscriber(keys.poses_key(SITE), self.poses),
         ]
-        self.b = enter(TagClient("b", connect=read_credentials(site.folder.bundle("b")).session, connect_timeout_s=10))
+        self.b = enter(
+            TagClient("b", connect=read_credentials(site.folder.bundle("b")).session, connect_timeout_s=PATIENCE_S)
+        )
         wait_until(lambda: self.alive.has(keys.tag_alive_key(SITE, "b")))
 
     def keep(self, *declared: object) -> None:

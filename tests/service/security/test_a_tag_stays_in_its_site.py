@@ -12,6 +12,7 @@ import zenoh.ext
 
 from dropanchor_schemas import keys
 from dropanchor_tag_client import TagClient, read_credentials
+from support.patience import PATIENCE_S
 from support.secured import SecuredSite, secured_site
 from support.zenoh_router import wait_until
 
@@ -51,7 +52,7 @@ class World:
         bundle = site.folder.bundle(site.folder.table.common_name(B, "cart"))
         credentials = read_credentials(bundle)
         assert (credentials.tag, credentials.site) == ("cart", B)
-        self.cart_b = enter(TagClient("cart", site=B, connect=credentials.session, connect_timeout_s=10))
+        self.cart_b = enter(TagClient("cart", site=B, connect=credentials.session, connect_timeout_s=PATIENCE_S))
 
     def keep(self, *declared: object) -> None:
         self._kept.extend(declared)

@@ -37,6 +37,23 @@ def test_a_running_service_follows_changes_of_the_file_within_a_second(tmp_path:
         running.identify(secret)
 
 
+def test_the_list_follows_changes_of_the_file(tmp_path: Path) -> None:
+    now_s = 0.0
+    running = ApiKeys(tmp_path, lambda: now_s)
+    ApiKeys(tmp_path).add("late", Scope.READ)
+    now_s = 1.1
+    assert [key.name for key in running.all().values()] == ["late"]  # nobody has used a key since
+
+
+def test_a_new_key_of_the_same_name_does_not_keep_the_streams_of_a_revoked_one(tmp_path: Path) -> None:
+    keys = ApiKeys(tmp_path)
+    lost = keys.identify(keys.add("phone", Scope.READ))
+    keys.revoke("phone")
+    found = keys.identify(keys.add("phone", Scope.READ))
+    assert keys.is_still_valid(found)
+    assert not keys.is_still_valid(lost)
+
+
 def test_an_expired_key_is_refused_as_expired(tmp_path: Path) -> None:
     keys = ApiKeys(tmp_path)
     secret = keys.add("short", Scope.READ, days=-1)

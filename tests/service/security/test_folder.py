@@ -18,6 +18,7 @@ from dropanchor_service.security.folder import SecurityError, SecurityFolder
 from dropanchor_service.settings.model import SecuritySettings, Settings
 from dropanchor_tag_client import read_credentials
 from support.commands import environment
+from support.patience import PATIENCE_S
 from support.secured import secured_site
 
 
@@ -146,7 +147,7 @@ def test_tags_added_by_concurrent_processes_are_all_kept(tmp_path: Path) -> None
         [sys.executable, "-m", "dropanchor_service", "tag", "add", f"t{n}", "--security", str(path)] for n in range(4)
     ]
     running = [subprocess.Popen(command, env=environment(), stdout=subprocess.DEVNULL) for command in commands]
-    assert [process.wait(60) for process in running] == [0] * 4
+    assert [process.wait(PATIENCE_S) for process in running] == [0] * 4
     assert sorted(SecurityFolder.open(path).table.tags) == ["t0", "t1", "t2", "t3"]
 
 

@@ -4,7 +4,7 @@ import pytest
 import zenoh
 
 from dropanchor_schemas import keys
-from dropanchor_service.persistence import open_sites
+from dropanchor_service.persistence.site import open_sites
 from dropanchor_service.settings.buckets import bucket_of, buckets_in
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.served import served_settings

@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from dropanchor_schemas import Anchor
-from dropanchor_service.persistence import open_sites
+from dropanchor_service.persistence.site import open_sites
 from dropanchor_service.settings.many_sites import MOST_WITH_FILES, refuse_too_many_sites
 from dropanchor_service.settings.quota import Quota
 from dropanchor_service.settings.sources import SettingsError, load_settings
 
 FILE = """
-unproven_tags = 7
+max_unconfirmed_tags = 7
 [tag_defaults]
 height_m = 1.0
 range_scale = 1.1

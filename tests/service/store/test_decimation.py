@@ -54,3 +54,9 @@ def test_rows_do_not_mix_and_decimation_restarts_after_a_clock_was_set_back() ->
 def test_few_poses_are_kept_of_a_tag_whose_position_is_unknown() -> None:
     times = np.arange(0, 10, 0.5)
     assert seconds_of(Decimation(SECOND, 0.1, 5 * SECOND).select(track(times, np.full(20, np.nan)))) == [0, 5]
+
+
+def test_a_tag_in_a_lift_is_kept_though_it_stands_on_the_map() -> None:
+    poses = track(np.arange(0, 4), np.zeros(4))
+    poses["z"] = [0.0, 0.2, 0.6, np.nan]
+    assert seconds_of(Decimation(SECOND, 0.1, 5 * SECOND).select(poses)) == [0, 2]

@@ -10,6 +10,7 @@ from dropanchor_service.security.credentials import credentials_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.zenoh_io.exposure import is_loopback, refuse_exposure
+from support.patience import PATIENCE_S
 from support.secured import secured_site
 from support.service import command, environment
 from support.zenoh_router import free_endpoint
@@ -97,7 +98,7 @@ def test_a_zenoh_configuration_file_is_checked_too(tmp_path: Path, text: str, re
 def test_the_program_exits_before_it_listens(arguments: list[str]) -> None:
     listen = [] if "--zenoh-listen" in arguments else ["--zenoh-listen", free_endpoint()]
     result = subprocess.run(
-        command(*arguments, *listen), capture_output=True, text=True, env=environment(), timeout=60, check=False
+        command(*arguments, *listen), capture_output=True, text=True, env=environment(), timeout=PATIENCE_S, check=False
     )
     assert result.returncode == 2
     assert "without credentials" in result.stderr

@@ -7,7 +7,7 @@ import pytest
 
 from dropanchor_schemas.site import TagSettings
 from dropanchor_schemas.zones import AmbiguousRule, BatteryLowRule, LostRule, TooCloseRule
-from dropanchor_service.estimation.columns import Frame, State, StateReason
+from dropanchor_service.estimation.columns import Frame, HeightSource, State, StateReason
 from support.events import EventBench, S, circle
 
 
@@ -66,6 +66,30 @@ def test_what_is_not_known_changes_nothing(unknown: dict[str, object]) -> None:
     assert bench.stay(5.0, "a", **{"x": 0.0} | unknown) == []
     assert bench.stay(2.0, "a", x=0.0) == ["zone.enter a"]
     assert bench.stay(5.0, "a", **{"x": 30.0} | unknown) == []
+
+
+def test_a_zone_of_a_floor_takes_the_tags_whose_height_is_there() -> None:
+    bench = EventBench()
+    bench.put(circle(z_min_m=3.0, z_max_m=6.0), circle("below", z_max_m=3.0))
+    height = {"z_std": 0.3, "z_source": HeightSource.PRESSURE}
+    assert bench.stay(2.0, "a", x=0.0, z=1.0, **height) == ["zone.enter a"]
+    assert bench.stay(2.0, "a", x=0.0, z=2.9, **height) == []  # between the two
+    assert bench.stay(2.0, "a", x=0.0, z=4.0, **height) == ["zone.enter a", "zone.exit a"]
+    assert [event.data.zone for event in bench.events()] == ["below", "dock", "below"]
+    assert bench.stay(2.0, "a", x=0.0, z=4.0, **height | {"z_std": 2.0}) == []
+    assert bench.stay(2.0, "a", x=30.0, z=4.0, **height) == ["zone.exit a"]
+
+
+@pytest.mark.parametrize("unknown", [{"z": math.nan}, {"z": 0.0, "z_std": 0.15}], ids=["unknown", "untold"])
+def test_a_tag_whose_height_is_not_known_enters_no_zone_with_heights_and_may_leave_it(
+    unknown: dict[str, float],
+) -> None:
+    bench = EventBench()
+    bench.put(circle(z_min_m=-1.0, z_max_m=3.0))
+    assert bench.stay(2.0, "a", x=0.0, **unknown) == []
+    assert bench.stay(2.0, "a", x=0.0, z=1.2, z_std=0.15) == ["zone.enter a"]
+    assert bench.stay(5.0, "a", x=0.0, **unknown) == []
+    assert bench.stay(2.0, "a", x=30.0, **unknown) == ["zone.exit a"]
 
 
 def test_a_silence_starts_the_delay_again() -> None:

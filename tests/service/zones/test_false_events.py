@@ -2,8 +2,8 @@
 
 import logging
 
+from dropanchor_evaluation.simulated import PriorKnowledge
 from dropanchor_service.estimation.columns import State
-from dropanchor_service.evaluation.simulated import PriorKnowledge
 from dropanchor_tag_client.simulator.perturbations import perturbed
 from dropanchor_tag_client.simulator.sensors import preset
 from dropanchor_tag_client.simulator.simulation import simulate

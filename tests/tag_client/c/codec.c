@@ -24,7 +24,9 @@ static int encode(void) {
     static dropanchor_range ranges[MAX_SAMPLES];
     static dropanchor_heading headings[MAX_SAMPLES];
     static dropanchor_bearing bearings[MAX_SAMPLES];
-    dropanchor_frame f = {.imu = imu, .ranges = ranges, .headings = headings, .bearings = bearings};
+    static dropanchor_pressure pressures[MAX_SAMPLES];
+    dropanchor_frame f = {
+        .imu = imu, .ranges = ranges, .headings = headings, .bearings = bearings, .pressures = pressures};
     int boot, replay;
     char kind[16];
     if (scanf("%d %d %" SCNu32 " %" SCNu32, &boot, &replay, &f.sequence, &f.boot_id) != 4) return 3;
@@ -46,6 +48,7 @@ static int encode(void) {
         if (kind[0] == 'r') ranges[f.range_count++] = (dropanchor_range){t_ns, anchor, value, std};
         if (kind[0] == 'h') headings[f.heading_count++] = (dropanchor_heading){t_ns, value, std};
         if (kind[0] == 'b') bearings[f.bearing_count++] = (dropanchor_bearing){t_ns, anchor, value, std};
+        if (kind[0] == 'p') pressures[f.pressure_count++] = (dropanchor_pressure){t_ns, value, std};
     }
     const size_t size = dropanchor_write(&f, payload, sizeof payload);
     if (size == 0) return 4;
@@ -80,6 +83,10 @@ static int decode(void) {
         const dropanchor_bearing s = dropanchor_bearing_at(payload, &h, i);
         printf("bearing %" PRId64 " %" PRIu32 " %a %a\n", s.t_ns, s.anchor, (double)s.bearing_rad, (double)s.std_rad);
     }
+    for (size_t i = 0; i < h.pressure_count; i++) {
+        const dropanchor_pressure s = dropanchor_pressure_at(payload, &h, i);
+        printf("pressure %" PRId64 " %a %a\n", s.t_ns, (double)s.pressure_pa, (double)s.temperature_c);
+    }
     return 0;
 }
 
@@ -99,6 +106,7 @@ static int check(void) {
             for (size_t i = 0; i < h.range_count; i++) used = dropanchor_range_at(exact, &h, i).std_m;
             for (size_t i = 0; i < h.heading_count; i++) used = dropanchor_heading_at(exact, &h, i).std_rad;
             for (size_t i = 0; i < h.bearing_count; i++) used = dropanchor_bearing_at(exact, &h, i).std_rad;
+            for (size_t i = 0; i < h.pressure_count; i++) used = dropanchor_pressure_at(exact, &h, i).temperature_c;
             (void)used;
         }
         free(exact);

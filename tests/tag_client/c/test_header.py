@@ -15,6 +15,7 @@ from dropanchor_schemas import keys
 from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.wire import COUNTS_AT, Rejection, anchor_number, encode_packed, read_header
 from support.golden import FILE, FRAMES, GOLDEN_KINDS
+from support.patience import PATIENCE_S
 
 ROOT = Path(__file__).parents[3]
 HEADER = ROOT / "tag_client/c"
@@ -37,7 +38,7 @@ def codec(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(codec: Path, *arguments: str, data: bytes = b"") -> subprocess.CompletedProcess[bytes]:
-    done = subprocess.run([codec, *arguments], input=data, capture_output=True, timeout=120, check=False)
+    done = subprocess.run([codec, *arguments], input=data, capture_output=True, timeout=PATIENCE_S, check=False)
     assert b"Sanitizer" not in done.stderr, done.stderr.decode()
     assert b"runtime error" not in done.stderr, done.stderr.decode()
     return done
@@ -46,7 +47,7 @@ def run(codec: Path, *arguments: str, data: bytes = b"") -> subprocess.Completed
 def as_text(frame: dict[str, Any]) -> str:
     """A frame as the test program reads it."""
     lines = [f"{int(frame['boot_clock'])} {int(frame['replay'])} {frame['sequence']} {frame['boot_id']}"]
-    for kind in ("imu", "range", "heading", "bearing"):
+    for kind in ("imu", "range", "heading", "bearing", "pressure"):
         for sample in frame[kind]:
             lines.append(" ".join([kind, *(word for value in sample.values() for word in words(value, kind))]))
     return "\n".join(lines) + "\n"

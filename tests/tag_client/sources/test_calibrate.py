@@ -23,6 +23,7 @@ from support.chips import FakeLibraries
 from support.commands import python, start_python
 from support.ingest import IngestBench
 from support.magnetism import FIELD_UT, Errors, rotation, samples
+from support.patience import PATIENCE_S
 from support.zenoh_router import connected_session, wait_until
 
 FOUND = Calibration((0.1, 0.2, 0.3), 2.0, True, (1.0, 2.0, 3.0), ((1.0, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 2.0)))
@@ -123,7 +124,7 @@ def test_lines_on_a_pipe_that_stays_open_are_calibrated_as_soon_as_they_suffice(
         later = [one._replace(t_ns=one.t_ns + 60_000_000_000) for one in everything]
         with pytest.raises(BrokenPipeError):  # it ends before it has read all of them
             process.stdin.write("".join(f"{line(one)}\n" for one in later))
-        assert process.wait(timeout=30) == 0
+        assert process.wait(PATIENCE_S) == 0
         assert read_calibration(tmp_path) is not None
     finally:
         process.kill()

@@ -12,6 +12,7 @@ from dropanchor_tag_client import TagClient
 from dropanchor_tag_client.sources.publish import publish_lines
 from support.commands import python, start_python
 from support.listening import ReceivedFrames, listening
+from support.patience import PATIENCE_S
 from support.zenoh_router import connected_session, wait_until
 
 T = 1_760_000_000_000_000_000
@@ -187,5 +188,5 @@ def test_lines_are_published_while_the_input_is_still_open(router_endpoint: str)
         process.stdin.write('{"heading_rad": 1}\n')
         process.stdin.flush()
         wait_until(lambda: heard.frames)
-        process.communicate(timeout=10)
+        process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0

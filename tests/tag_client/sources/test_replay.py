@@ -16,13 +16,20 @@ ANCHORS = "id,x,y,z\nL0,1,2,0.5\n7,0,0,0\n"
 RANGES = "t_s,anchor_id,range_m,std_m\n10.0,L0,1.5,0.25\n10.2,7,2.5,\n10.4,L0,1.75,0.5\n"
 IMU = "t_s,ax,ay,az,gx,gy,gz,mx,my,mz\n10.1,0.5,0.25,9.75,0,0,1,1,2,3\n10.3,0,0,9,0,0,0.5,,,\n"
 HEADINGS = "t_s,yaw_rad\n10.25,1.5\n"
+PRESSURES = "t_s,pressure_pa,temperature_c\n10.15,101325,21.5\n10.35,101300,\n"
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     yard = tmp_path / "yard"
     yard.mkdir()
-    for name, text in {"anchors": ANCHORS, "range": RANGES, "imu": IMU, "heading": HEADINGS}.items():
+    for name, text in {
+        "anchors": ANCHORS,
+        "range": RANGES,
+        "imu": IMU,
+        "heading": HEADINGS,
+        "pressure": PRESSURES,
+    }.items():
         (yard / f"{name}.csv").write_text(text)
     return yard
 
@@ -38,7 +45,7 @@ def samples(heard: ReceivedFrames) -> int:
 def test_every_sample_keeps_its_values_and_its_time(router_endpoint: str, folder: Path) -> None:
     with listening(router_endpoint) as heard:
         assert main(["replay", str(folder), "--connect", router_endpoint, "--speed", "0", "--t0-ns", str(T0)]) == 0
-        wait_until(lambda: samples(heard) == 6)
+        wait_until(lambda: samples(heard) == 8)
     (frame,) = heard.frames
     assert heard.keys == ["dropanchor/@v1/default/tag/yard/samples"]
     second = 1_000_000_000
@@ -51,13 +58,15 @@ def test_every_sample_keeps_its_values_and_its_time(router_endpoint: str, folder
     assert frame.imu[0] == (T0 + 10 * second + 100_000_000, (0.5, 0.25, 9.75), (0.0, 0.0, 1.0), (1.0, 2.0, 3.0))
     assert frame.imu[1].mag is None
     assert frame.headings[0][:2] == (T0 + 10 * second + 250_000_000, 1.5)
+    assert frame.pressures[0] == (T0 + 10 * second + 150_000_000, 101_325.0, 21.5)
+    assert frame.pressures[1][:2] == (T0 + 10 * second + 350_000_000, 101_300.0)
 
 
 def test_one_anchor_alone_may_be_replayed_under_another_name(router_endpoint: str, folder: Path) -> None:
     options = ["--anchor", "7", "--speed", "0", "--tag", "cart", "--site", "west", "--encoding", "json"]
     with listening(router_endpoint, site="west") as heard:
         assert main(["replay", str(folder), "--connect", router_endpoint, *options]) == 0
-        wait_until(lambda: samples(heard) == 4)
+        wait_until(lambda: samples(heard) == 6)
     assert heard.keys == ["dropanchor/@v1/west/tag/cart/samples"]
     assert heard.ranges() == [2.5]
 
@@ -70,7 +79,7 @@ def test_a_replay_takes_the_time_of_its_speed_and_ends_at_the_present(
         began, began_ns = time.monotonic(), time.time_ns()
         assert main(["replay", str(folder), "--connect", router_endpoint, "--speed", speed]) == 0
         took, ended_ns = time.monotonic() - began, time.time_ns()
-        wait_until(lambda: samples(heard) == 6)
+        wait_until(lambda: samples(heard) == 8)
     assert length_s <= took < length_s + 15.0
     assert times(heard.frames)[-1] - times(heard.frames)[0] == pytest.approx(400_000_000, abs=2000)
     assert began_ns + length_s * 1e9 - 1e8 <= times(heard.frames)[-1] <= ended_ns

@@ -15,6 +15,7 @@ from dropanchor_tag_client.recording import read_recording
 from dropanchor_tag_client.simulator.live import start_poses
 from support.commands import python, start_python
 from support.listening import ReceivedFrames, listening
+from support.patience import PATIENCE_S
 from support.zenoh_router import free_endpoint, running_router, wait_until
 
 COMMAND = ("-m", "dropanchor_tag_client", "simulate")
@@ -49,7 +50,7 @@ def test_ctrl_c_ends_it_at_once() -> None:
         try:
             wait_until(lambda: len(tags_of(heard)) == 2)
             process.send_signal(signal.SIGINT)
-            assert process.wait(timeout=60.0) == 130
+            assert process.wait(PATIENCE_S) == 130
         finally:
             process.kill()
             _, said = process.communicate()

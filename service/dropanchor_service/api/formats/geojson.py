@@ -1,7 +1,7 @@
 """Poses as GeoJSON (RFC 7946, WGS 84), and content negotiation between GeoJSON and JSON."""
 
+import math
 import re
-from typing import Any
 
 from fastapi import Request
 
@@ -43,10 +43,18 @@ def require_georeference(answers: Answers, form: str) -> None:
 
 def feature_of(pose: Answer) -> Answer:
     """Return a pose as a Feature; `geometry` is null while the position is unknown."""
-    geometry: Any = None
-    if pose["lat"] is not None and pose["lat"] == pose["lat"]:  # NaN: the position is unknown
-        geometry = {"type": "Point", "coordinates": [pose["lon"], pose["lat"]]}
-    return {"type": "Feature", "id": pose["tag"], "geometry": geometry, "properties": pose}
+    return {"type": "Feature", "id": pose["tag"], "geometry": point_of(pose), "properties": pose}
+
+
+def point_of(pose: Answer) -> Answer | None:
+    """Return the Point of a pose, with its altitude if that is known; None while the position is unknown."""
+    place = [pose[name] for name in ("lon", "lat", "alt_m") if is_known(pose.get(name))]
+    return {"type": "Point", "coordinates": place} if len(place) >= 2 else None
+
+
+def is_known(value: float | None) -> bool:
+    """Return whether a number of an answer is neither null nor NaN."""
+    return value is not None and math.isfinite(value)
 
 
 def collection_of(pose_list: Answer) -> Answer:

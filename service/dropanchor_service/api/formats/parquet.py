@@ -15,15 +15,19 @@ from dropanchor_service.api.formats.track import COVARIANCES, RELATIVES, covaria
 GROUP_ROWS = 20_000
 FRAME = (
     "x and y are east and north of the origin of the site in m, turned counter-clockwise by georeference.rotation_rad; "
+    "z is the height along the z axis of the anchors, and georeference.alt_m the altitude of the height 0 m; "
     "the heading is counter-clockwise from x in rad; the columns relative_… are in a frame of the tag's own, turned "
     "about its anchor by an unknown angle"
 )
-_TEXTS = ("state", "reason", "frame", "anchor")
+_TEXTS = ("state", "reason", "frame", "anchor", "z_source", "floor")
 _UNITS = {
     "t_ns": "ns since 1970-01-01 UTC",
     "t_utc": "UTC",
     "x": "m",
     "y": "m",
+    "z": "m",
+    "z_std_m": "m",
+    "floor_probability": "1",
     "heading_rad": "rad",
     "speed_mps": "m/s",
     "yaw_rate_radps": "rad/s",
@@ -33,6 +37,7 @@ _UNITS = {
     "range_m": "m",
     "lat": "degrees, WGS 84",
     "lon": "degrees, WGS 84",
+    "alt_m": "m",
     "var_x": "m²",
     "cov_xy": "m²",
     "cov_xh": "m·rad",
@@ -43,6 +48,7 @@ _UNITS = {
 }
 _UNITS |= {name: _UNITS[name.removeprefix("relative_")] for name in RELATIVES}
 _DEGREES = ("lat", "lon")  # a float32 would be 2 m wide
+_ON_EARTH = (*_DEGREES, "alt_m")
 
 
 def stream(pages: Iterable[TrackPage], tag: str, site: Site) -> Iterator[bytes]:
@@ -94,11 +100,13 @@ def _groups(pages: Iterable[TrackPage]) -> Iterator[list[TrackPage]]:
 
 def schema_of(tag: str, site: Site) -> pa.Schema:
     """Return the columns, their types and units, and what the numbers mean."""
-    names = [name for name in _UNITS if name not in _DEGREES or site.georeference is not None]
+    origin = site.georeference
+    known = [] if origin is None else [*_DEGREES, *(["alt_m"] if origin.alt_m is not None else [])]
+    names = [name for name in _UNITS if name not in _ON_EARTH or name in known]
     numbers = [pa.field(name, _type_of(name), metadata={"unit": _UNITS[name]}) for name in names]
     texts = [pa.field(name, pa.dictionary(pa.int32(), pa.string())) for name in _TEXTS]
-    origin = "null" if site.georeference is None else site.georeference.model_dump_json()
-    metadata = {"tag": tag, "site": site.id, "frame": FRAME, "georeference": origin}
+    metadata = {"tag": tag, "site": site.id, "frame": FRAME}
+    metadata["georeference"] = "null" if origin is None else origin.model_dump_json()
     return pa.schema(
         [*numbers[:2], *texts, *numbers[2:]],
         metadata={f"dropanchor.{name}": text for name, text in metadata.items()},

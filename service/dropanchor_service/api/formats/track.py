@@ -73,9 +73,7 @@ def _document(head: Head, name: str, parts: Iterable[list[dict[str, Any]]]) -> I
 
 
 def _feature(pose: dict[str, Any]) -> dict[str, Any]:
-    lat, lon = pose["lat"], pose["lon"]
-    geometry = {"type": "Point", "coordinates": [lon, lat]} if math.isfinite(lat) else None
-    return {"type": "Feature", "geometry": geometry, "properties": pose}
+    return {"type": "Feature", "geometry": geojson.point_of(pose), "properties": pose}
 
 
 def _csv(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:  # noqa: ARG001 - a table has no place for the head
@@ -128,7 +126,8 @@ def _gpx(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:
 def _gpx_point(pose: dict[str, Any], last_ns: int | None) -> str:
     """Return a point, in a new segment if it comes long after the one of `last_ns`."""
     apart = last_ns is not None and pose["t_ns"] - last_ns > GAP_NS
-    point = f'<trkpt lat="{pose["lat"]:.9f}" lon="{pose["lon"]:.9f}"><time>{_utc(pose["t_ns"])}</time>'
+    elevation = f"<ele>{pose['alt_m']:.3f}</ele>" if geojson.is_known(pose.get("alt_m")) else ""
+    point = f'<trkpt lat="{pose["lat"]:.9f}" lon="{pose["lon"]:.9f}">{elevation}<time>{_utc(pose["t_ns"])}</time>'
     return ("</trkseg><trkseg>\n" if apart else "") + f"{point}<type>{pose['state']}</type></trkpt>\n"
 
 

@@ -9,6 +9,7 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from dropanchor_schemas.sentences import Sentence, said_by, say
 from dropanchor_service.api.http.errors import Kind, problem_response
 from dropanchor_service.api.http.permissions import INGEST, OF_ALL_SITES, Need, has_in, need_of
 from dropanchor_service.api.http.rates import RateLimiter
@@ -20,10 +21,11 @@ from dropanchor_service.security.identity import Authenticator, Identity, Unauth
 KEY_IN_URL = (f"{INGEST}sensor-logger", f"{INGEST}phyphox")
 """Paths for apps of phones that cannot set headers."""
 LOOPBACK = "loopback"
-_LIMITED = "This share link shows its tags and nothing else."
-_HOW_TO_AUTHENTICATE = (
+_LIMITED = say("link_limited", "This share link shows its tags and nothing else.")
+_HOW_TO_AUTHENTICATE = say(
+    "how_to_authenticate",
     "Send an API key or a token in the header `Authorization: Bearer …`. An operator creates a key with "
-    "`dropanchor key add NAME --scope read`; for the samples of a tag, with `--tag TAG` instead of `--scope`."
+    "`dropanchor key add NAME --scope read`; for the samples of a tag, with `--tag TAG` instead of `--scope`.",
 )
 
 
@@ -76,11 +78,19 @@ class Access:
             return None, None
         secret = secret_of(request)
         if not secret:
-            return None, _unauthenticated(request, f"This request needs credentials. {_HOW_TO_AUTHENTICATE}")
+            return None, _unauthenticated(
+                request, say("credentials_missing", "This request needs credentials. {how}", how=_HOW_TO_AUTHENTICATE)
+            )
         try:
             return await identify(self._authenticator, secret), None
         except UnauthenticatedError as error:
-            return None, _unauthenticated(request, f"Authentication failed: {error}. {_HOW_TO_AUTHENTICATE}")
+            detail = say(
+                "credentials_refused",
+                "Authentication failed: {why}. {how}",
+                why=said_by(error),
+                how=_HOW_TO_AUTHENTICATE,
+            )
+            return None, _unauthenticated(request, detail)
 
     def _rate_limited(self, request: Request, identity: Identity | None) -> Response | None:
         client = client_of(request, identity)
@@ -90,7 +100,11 @@ class Access:
         if wait_s == 0:
             return None
         seconds = math.ceil(wait_s)
-        detail = f"Wait {seconds} s before the next request. /api/v1/poses and /api/v1/stream return all tags at once."
+        detail = say(
+            "wait",
+            "Wait {seconds} s before the next request. /api/v1/poses and /api/v1/stream return all tags at once.",
+            seconds=seconds,
+        )
         return problem_response(request, Kind.TOO_MANY_REQUESTS, detail, headers={"retry-after": str(seconds)})
 
     def _forbidden(self, request: Request, identity: Identity | None) -> Response | None:
@@ -157,14 +171,14 @@ def _forbidden(request: Request, identity: Identity | None, site: str | None, se
     if identity is None:
         return None
     need, has = need_of(request.method, request.scope["path"]), has_in(identity, site)
-    where = "" if not several_sites else f" in site {site!r}" if site else " in every site"
+    where = _where(site) if several_sites else ""
     if need is Need.TAG:
         allowed = speaks_in(identity, site, several_sites)
-        needs = f"a key that was created with {key_command(several_sites)}"
+        needs = say("tag_key", "a key that was created with {command}", command=key_command(several_sites))
     elif request.scope["path"] in OF_ALL_SITES and identity.of_sites and identity.limit is None:
         return None  # it learns of its sites alone
     else:
-        allowed, needs = has >= need, f"the scope {max(need, Need.READ).name.lower()}{where}"
+        allowed, needs = has >= need, _scope(max(need, Need.READ), where)
     if allowed:
         return None
     return problem_response(request, Kind.FORBIDDEN, _refusal(identity, has, where, needs))
@@ -174,9 +188,26 @@ def _refusal(identity: Identity, has: Need, where: str, needs: str) -> str:
     if has is Need.LINK_TO_TAGS:
         return _LIMITED
     if has is Need.LINK:
-        return f"A share link shows the page and no more; this request needs {needs}."
-    held = f"the scope {has.name.lower()}{where}" if has else f"no scope{where}"
-    return f"The {identity.source} of {identity.name!r} has {held}; this request needs {needs}."
+        return say("link_shows", "A share link shows the page and no more; this request needs {needs}.", needs=needs)
+    held = _scope(has, where) if has else say("no_scope", "no scope{where}", where=where)
+    return say(
+        "scope_missing",
+        "The {source} of {name} has {has}; this request needs {needs}.",
+        source=identity.source,
+        name=repr(identity.name),
+        has=held,
+        needs=needs,
+    )
+
+
+def _scope(scope: Need, where: str) -> Sentence:
+    return say("scope", "the scope {scope}{where}", scope=scope.name.lower(), where=where)
+
+
+def _where(site: str | None) -> str:
+    if site is None:
+        return say("in_every_site", " in every site")
+    return say("in_site", " in site {site}", site=repr(site))
 
 
 def speaks_in(identity: Identity, site: str | None, several_sites: bool) -> bool:

@@ -12,6 +12,8 @@ from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from dropanchor_schemas.sentences import say
+from dropanchor_service.api.http.closing import reason_of
 from dropanchor_service.api.http.errors import Kind, problem_response
 from dropanchor_service.api.http.hosts import ALL, Hosts, name_in
 from dropanchor_service.api.http.of_cluster import HOST, is_of_node
@@ -23,8 +25,12 @@ from dropanchor_service.settings.http import HttpSettings
 FORBIDDEN = 4403
 """The code with which the service ends a WebSocket."""
 _MAX_NAME = 100
-_NO_SUCH_PAGE = "A page of another origin may not connect: http.cors_origins in the settings can allow its origin."
-_NO_SUCH_HOST = "The service does not have this name: http.allowed_hosts in the settings can add it."
+_NO_SUCH_PAGE = say(
+    "other_origin", "A page of another origin may not connect: http.cors_origins in the settings can allow its origin."
+)
+_NO_SUCH_HOST = say(
+    "no_such_host", "The service does not have this name: http.allowed_hosts in the settings can add it."
+)
 
 
 @dataclass(frozen=True)
@@ -102,18 +108,20 @@ def _netloc(origin: str) -> str:
 
 
 def _no_such_host(host: str) -> str:
-    name = (name_in(host) or host)[:_MAX_NAME]
-    return (
-        f"The service does not have the name {name!r}, so a page of somebody else may have turned that name to it. If "
-        "it is yours, add it to `allowed_hosts` in `[http]` of the settings. The address of the machine works, too."
+    return say(
+        "other_host",
+        "The service does not have the name {name}, so a page of somebody else may have turned that name to it. If "
+        "it is yours, add it to `allowed_hosts` in `[http]` of the settings. The address of the machine works, too.",
+        name=repr((name_in(host) or host)[:_MAX_NAME]),
     )
 
 
 def _no_such_page(headers: Headers) -> str:
-    origin = headers.get("origin", "another origin")[:_MAX_NAME]
-    return (
-        f"A page of {origin!r} may not change or send anything here. To let it, add its origin to `cors_origins` in "
-        "`[http]` of the settings; behind a proxy, let it pass the `Host` on."
+    return say(
+        "other_page",
+        "A page of {origin} may not change or send anything here. To let it, add its origin to `cors_origins` in "
+        "`[http]` of the settings; behind a proxy, let it pass the `Host` on.",
+        origin=repr(headers.get("origin", "another origin")[:_MAX_NAME]),
     )
 
 
@@ -125,4 +133,4 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, kind: Kind, detail
     await receive()
     offered = scope.get("subprotocols", [])
     await send({"type": "websocket.accept", "subprotocol": offered[0] if offered else None})
-    await send({"type": "websocket.close", "code": FORBIDDEN, "reason": reason})
+    await send({"type": "websocket.close", "code": FORBIDDEN, "reason": reason_of(reason, scope)})

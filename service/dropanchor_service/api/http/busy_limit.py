@@ -3,6 +3,7 @@
 from starlette.requests import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.api.http.errors import Kind, problem_response
 
 SHARE = 0.75  # of the connections, for streams and requests other than these
@@ -27,7 +28,9 @@ class BusyLimit:
             finally:
                 self._open -= 1
         elif scope["type"] == "http":
-            detail = f"{self._limit} requests and streams are open, which is the limit. Try again later."
+            detail = say(
+                "busy", "{n} requests and streams are open, which is the limit. Try again later.", n=self._limit
+            )
             await problem_response(Request(scope), Kind.BUSY, detail)(scope, receive, send)
         else:
             await send({"type": "websocket.close", "code": 1013})

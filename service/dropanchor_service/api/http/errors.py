@@ -11,6 +11,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.routing import Match
 
+from dropanchor_schemas.sentences import Sentence, phrase_of, said_by, say
 from dropanchor_service.api.http.site_in_path import is_omlox
 
 MEDIA_TYPE = "application/problem+json"
@@ -37,7 +38,9 @@ class Kind(Enum):
     UNKNOWN_ZONE = (404, "The zone is unknown")
     UNKNOWN_RULE = (404, "The rule is unknown")
     UNKNOWN_SHARE = (404, "The share link is unknown")
+    UNKNOWN_KEY = (404, "The API key is unknown")
     UNKNOWN_DESTINATION = (404, "The destination is unknown")
+    UNKNOWN_NETWORK = (404, "The network is not among those that the page allows")
     UNKNOWN_PLAN = (404, "The floor plan is unknown")
     UNKNOWN_PLAN_IMAGE = (404, "The image of a floor plan is unknown")
     UNKNOWN_TRACKABLE = (404, "The trackable is unknown")
@@ -114,16 +117,23 @@ def problem_response(
 ) -> Response:
     """Return a problem of this kind. status: overrides the status of the kind. members: extension members."""
     status = kind.status if status is None else status
-    path = _path(request)
+    path, phrase = _path(request), phrase_of(detail)
     if kind in (Kind.NOT_READY, Kind.BUSY):
         headers = {"retry-after": "1", **(headers or {})}
     if is_omlox(path):
         status = 400 if status == 422 else status  # the standard knows no 422
         members = {"code": status, "message": detail} | dict(members or {})
+    elif phrase is not None:
+        members = {"detail_phrase": phrase} | dict(members or {})
     problem = {"type": kind.type, "title": kind.title, "status": status, "detail": detail, "instance": path}
     # ASCII: a request may hold lone surrogates, which UTF-8 cannot encode.
     body = json.dumps(problem | dict(members or {}), ensure_ascii=True).encode()
     return Response(body, status, {"cache-control": "no-store", **(headers or {})}, MEDIA_TYPE)
+
+
+def at(place: str, text: str) -> str:
+    """Return a sentence about a part of the request. place: as in `InvalidPart`."""
+    return say("at", "{place}: {what}", place=place, what=text)
 
 
 def add_error_handlers(app: FastAPI) -> None:
@@ -149,13 +159,20 @@ async def _on_http_exception(request: Request, error: Exception) -> Response:
         return problem_response(request, error.kind, error.detail, members=error.members)
     match error.status_code:
         case 404:
-            return problem_response(request, Kind.NOT_FOUND, f"There is no resource at {_path(request)}.")
+            return problem_response(
+                request, Kind.NOT_FOUND, say("no_resource", "There is no resource at {path}.", path=_path(request))
+            )
         case 405:
             allow = ", ".join(_allowed_methods(request))
-            detail = f"This resource does not allow {request.method}. It allows {allow}."
+            detail = say(
+                "no_method",
+                "This resource does not allow {method}. It allows {allowed}.",
+                method=request.method,
+                allowed=allow,
+            )
             return problem_response(request, Kind.METHOD_NOT_ALLOWED, detail, headers={"allow": allow})
         case 400:
-            return problem_response(request, Kind.INVALID_REQUEST, "The body cannot be read as JSON.")
+            return problem_response(request, Kind.INVALID_REQUEST, say("no_json", "The body cannot be read as JSON."))
     headers = dict(error.headers or {})
     return problem_response(request, Kind.OTHER, str(error.detail), status=error.status_code, headers=headers)
 
@@ -164,7 +181,7 @@ async def _on_invalid_request(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     parts = [
         # Never repeat the input: it may be a secret, or a number that JSON cannot express.
-        {"location": _location(part["loc"]), "detail": message_of(part)}
+        {"location": _location(part["loc"]), "detail": (text := message_of(part)), "detail_phrase": phrase_of(text)}
         for part in error.errors()[:_MAX_PARTS]
     ]
     detail = "; ".join(f"{part['location']}: {part['detail']}" for part in parts[:3])
@@ -173,7 +190,7 @@ async def _on_invalid_request(request: Request, error: Exception) -> Response:
 
 async def _on_exception(request: Request, error: Exception) -> Response:  # noqa: ARG001 - the server logs it
     return problem_response(
-        request, Kind.INTERNAL, "An unexpected error occurred. The log of the service has the details."
+        request, Kind.INTERNAL, say("internal", "An unexpected error occurred. The log of the service has the details.")
     )
 
 
@@ -189,10 +206,18 @@ def _location(parts: Iterable[Any]) -> str:
 def message_of(part: Mapping[str, Any]) -> str:
     """Return what is wrong with a part of a request. part: an error of Pydantic."""
     if part["type"] == "json_invalid":
-        return f"is not JSON: {part['ctx']['error']}"
+        return say("not_json", "is not JSON: {why}", why=part["ctx"]["error"])
     if part["type"] == "extra_forbidden":
-        return "is unknown"
-    return str(part["msg"]).removeprefix("Value error, ")
+        return say("unknown_field", "is unknown")
+    if part["type"] == "value_error":
+        return said_by(part["ctx"]["error"])
+    return Sentence(
+        part["msg"], f"invalid.{part['type']}", {name: _text(value) for name, value in part.get("ctx", {}).items()}
+    )
+
+
+def _text(value: object) -> str:
+    return f"{value:.15g}" if isinstance(value, float) else str(value)
 
 
 def _allowed_methods(request: Request) -> list[str]:

@@ -10,6 +10,7 @@ from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.api.http.errors import Kind, ProblemError, problem_response
 from dropanchor_service.api.http.open_sockets import OpenSockets
 from dropanchor_service.api.http.site_in_path import divided, is_omlox
@@ -52,7 +53,7 @@ def _counted(receive: Receive, max_bytes: int) -> Receive:
 
 
 def _too_large(max_bytes: int) -> str:
-    return f"A request body may have at most {max_bytes} bytes."
+    return say("body_too_large", "A request body may have at most {bytes} bytes.", bytes=max_bytes)
 
 
 class EscapedPath:

@@ -33,11 +33,12 @@ _BY_LINKS_TO_TAGS = (
 _BY_LINKS = (
     *("sites", "sites/poses", "anchors", "anchors/{}", "tags/{}/explain"),
     *("zones", "zones/{}", "zone-occupancy", "event-rules", "event-rules/{}", "events", "events/stream"),
+    "history/coverage",
     *("plans", "plans/{}", "plan-images/{}", "basemap", "basemap/{}/{}/{}"),
 )
-_OF_ADMINISTRATORS = f"{PREFIX}shares"
-"""Share links: nobody else even reads them."""
-_CHANGED_BY_ADMINISTRATORS = re.compile(f"{PREFIX}(site|destinations/.*)", re.DOTALL)
+_OF_ADMINISTRATORS = (f"{PREFIX}shares", f"{PREFIX}keys")
+"""Share links and keys: nobody else even reads them."""
+_CHANGED_BY_ADMINISTRATORS = re.compile(f"{PREFIX}(site|destinations/.*|receiver-networks/.*)", re.DOTALL)
 
 
 class Need(IntEnum):

@@ -22,6 +22,7 @@ from dropanchor_service.runtime import open_files
 from dropanchor_service.security.certificate import Certificate
 
 GRACE_S = 1  # for open requests at shutdown; stuck clients use all of it
+ACCEPTING_TURNS = 2  # of the loop, until an accepted connection is known to the server
 TICK_S = 1.0  # between two dates in the answers
 PING_S = 10.0  # between two pings of a WebSocket, and the time to answer one
 _SEND_BUFFER_BYTES = 262_144  # how much data a client that stops reading can hold in the kernel
@@ -68,6 +69,11 @@ class Server(uvicorn.Server):
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         self._stopping.set()
+        # asyncio forgets a connection that is accepted in the moment in which its listener is closed.
+        for listener in sockets or ():
+            asyncio.get_running_loop().remove_reader(listener)
+        for _ in range(ACCEPTING_TURNS):
+            await asyncio.sleep(0)
         await super().shutdown(sockets)
         for connection in list(self.server_state.connections):
             connection.transport.abort()

@@ -6,8 +6,8 @@ from uuid import UUID
 
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.omlox.ids import trackable_id
-from dropanchor_service.api.omlox.items import OmloxItems
-from dropanchor_service.api.omlox.models import Trackable
+from dropanchor_service.store.omlox_items import OmloxItems
+from dropanchor_service.store.omlox_models import Trackable
 from dropanchor_service.store.tags import Tag
 
 

@@ -11,13 +11,14 @@ from dropanchor_schemas.zones import Zone as SiteZone
 from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.omlox.ids import fence_id
-from dropanchor_service.api.omlox.items import OmloxItems
-from dropanchor_service.api.omlox.models import LOCAL, WGS84, Fence, Point, Polygon, without_nulls
+from dropanchor_service.api.omlox.models import LOCAL, WGS84, without_nulls
 from dropanchor_service.api.omlox.own_properties import with_own, without_own
 from dropanchor_service.api.omlox.projection import DECIMALS, Projection, projection_of
 from dropanchor_service.api.omlox.zones import has_zone, main_zone
 from dropanchor_service.api.routes.parameters import saving
 from dropanchor_service.store.items import FullError, NamedItems
+from dropanchor_service.store.omlox_items import OmloxItems
+from dropanchor_service.store.omlox_models import Fence, Point, Polygon
 from dropanchor_service.zones.shapes import ShapeError, vertices_of
 
 _KEPT_BY_THE_ZONE = {"id": None, "name": None, "region": None, "radius": None, "crs": None, "zone_id": None}

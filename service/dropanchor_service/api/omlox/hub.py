@@ -9,13 +9,14 @@ from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.omlox.assets import Asset, Assets
 from dropanchor_service.api.omlox.fences import Fences
 from dropanchor_service.api.omlox.inside import Inside
-from dropanchor_service.api.omlox.items import OmloxItems
-from dropanchor_service.api.omlox.models import Properties, without_nulls
+from dropanchor_service.api.omlox.models import without_nulls
 from dropanchor_service.api.omlox.own_properties import with_own
 from dropanchor_service.api.omlox.places import Places, best_of
 from dropanchor_service.api.omlox.projection import Projection
 from dropanchor_service.events.store import EventStore
 from dropanchor_service.store.items import NamedItems
+from dropanchor_service.store.omlox_items import OmloxItems
+from dropanchor_service.store.omlox_models import Properties
 from dropanchor_service.store.tags import Tag
 
 MAX_REASONS = 3  # in the text of a problem

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from dropanchor_service.api.omlox.models import Properties
+from dropanchor_service.store.omlox_models import Properties
 
 OWN = "dropanchor"
 

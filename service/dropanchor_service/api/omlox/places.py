@@ -14,8 +14,8 @@ from dropanchor_schemas.pose import TrackingState
 from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.api.omlox.assets import Assets
 from dropanchor_service.api.omlox.ids import zone_id
-from dropanchor_service.api.omlox.models import Properties
 from dropanchor_service.api.omlox.projection import Projection
+from dropanchor_service.store.omlox_models import Properties
 from dropanchor_service.store.tags import Tag
 
 SHOWN = (TrackingState.TRACKING, TrackingState.DEGRADED, TrackingState.COASTING)
@@ -29,6 +29,8 @@ _PROPERTIES = (
     "frame",
     "covariance",
     "ellipse_95",
+    "z_std_m",
+    "z_source",
     "p_mode",
     "sigma_obs_m",
     "yaw_rate_radps",
@@ -76,6 +78,7 @@ class Places:
         return [
             {
                 "position": {"type": "Point", "coordinates": coordinates},
+                **projection.elevation(coordinates),
                 "source": sources.get(pose["anchor"], otherwise) or pose["tag"],
                 "provider_type": "uwb",
                 "provider_id": pose["tag"],
@@ -86,9 +89,7 @@ class Places:
                 **_measured(pose, rotation),
                 "properties": {name: pose[name] for name in _PROPERTIES},
             }
-            for pose, coordinates in zip(
-                shown, projection.coordinates([(pose["x"], pose["y"]) for pose in shown]), strict=True
-            )
+            for pose, coordinates in zip(shown, projection.places(shown), strict=True)
         ]
 
 

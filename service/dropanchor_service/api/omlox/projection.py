@@ -1,5 +1,6 @@
 """Coordinates of omlox objects: those of the site frame (`local`), or longitude and latitude (`EPSG:4326`)."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from dropanchor_schemas.site import Georeference, Site
+from dropanchor_service.answers.answers import Answer
 from dropanchor_service.answers.geodesy import lat_lon, site_xy
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.omlox.models import LOCAL, WGS84
@@ -23,6 +25,20 @@ class Projection:
     @property
     def crs(self) -> str:
         return LOCAL if self.origin is None else WGS84
+
+    def places(self, poses: Sequence[Answer]) -> list[list[float]]:
+        """Return the coordinates of placed poses: [x, y, z] in the site frame, and on earth with altitude if known."""
+        name = "z" if self.origin is None else "alt_m"
+        places = self.coordinates([(pose["x"], pose["y"]) for pose in poses])
+        heights = [pose[name] for pose in poses]
+        return [
+            place if height is None or not math.isfinite(height) else [*place, round(height, DECIMALS)]
+            for place, height in zip(places, heights, strict=True)
+        ]
+
+    def elevation(self, place: Sequence[float]) -> dict[str, str]:
+        """Return what says what the third of these coordinates is. In the site frame that is the default."""
+        return {"elevation_ref": "wgs84"} if self.origin is not None and len(place) == 3 else {}
 
     def coordinates(self, points: Sequence[Sequence[float]]) -> list[list[float]]:
         """Return the coordinates of these points (x, y), m."""

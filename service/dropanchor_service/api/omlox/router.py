@@ -15,6 +15,7 @@ from dropanchor_service.api.omlox.routes.fences import fences_router
 from dropanchor_service.api.omlox.routes.providers import providers_router
 from dropanchor_service.api.omlox.routes.trackables import trackables_router
 from dropanchor_service.api.omlox.routes.zones import zones_router
+from dropanchor_service.api.routes.below import below
 from dropanchor_service.api.routes.parameters import json_response
 from dropanchor_service.api.routes.site_of_request import SITE_PREFIX, SiteOfRequest
 
@@ -33,14 +34,14 @@ def add_omlox(app: FastAPI, site_of: SiteOfRequest, doorkeeper: Doorkeeper, stop
         path = f"{OMLOX_PREFIX}{version}"
         for prefix in (SITE_PREFIX + path, *([path] if site_of.only else [])):
             for router in (described, feed, _document_router(described)):
-                app.include_router(router, prefix=prefix, include_in_schema=False)
+                app.router.routes.extend(below(prefix, router.routes, documented=False))
 
 
 def described_routes() -> APIRouter:
     """Return the routes that the document describes."""
     router = APIRouter()
     for part in (trackables_router(), providers_router(), zones_router(), fences_router()):
-        router.include_router(part)
+        router.routes.extend(part.routes)
     return router
 
 

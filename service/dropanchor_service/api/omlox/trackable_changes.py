@@ -6,12 +6,12 @@ from dropanchor_schemas.site import TagSettings
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.omlox.assets import Asset
 from dropanchor_service.api.omlox.hub import Hub
-from dropanchor_service.api.omlox.models import Trackable
 from dropanchor_service.api.omlox.own_properties import without_own
 from dropanchor_service.api.omlox.parameters import exists_already, require_id
 from dropanchor_service.api.routes.parameters import saving
 from dropanchor_service.api.routes.tags import register_tag
 from dropanchor_service.store.items import FullError, Item, NamedItems
+from dropanchor_service.store.omlox_models import Trackable
 from dropanchor_service.store.tags import Tag
 
 

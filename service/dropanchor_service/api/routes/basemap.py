@@ -1,6 +1,6 @@
 """The routes for the base map: its description, and its tiles."""
 
-from typing import Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from fastapi import APIRouter, Header, Path
 from starlette.responses import Response
@@ -9,8 +9,10 @@ from dropanchor_schemas.basemap import Basemap, TileMediaType
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
-from dropanchor_service.basemap.basemap import ServedBasemap
-from dropanchor_service.basemap.file import UnreadableTileError
+from dropanchor_service.basemap.errors import UnreadableTileError
+
+if TYPE_CHECKING:
+    from dropanchor_service.basemap.basemap import ServedBasemap  # an extra
 
 _NO_BASEMAP = Basemap(tiles=None)
 _EXAMPLE = {
@@ -40,7 +42,7 @@ Column = Annotated[int, Path(ge=0, lt=2**31, description="Column of the tile, fr
 Line = Annotated[int, Path(ge=0, lt=2**31, description="Line of the tile, from the north.", examples=[10749])]
 
 
-def basemap_router(basemap: ServedBasemap | None) -> APIRouter:
+def basemap_router(basemap: "ServedBasemap | None") -> APIRouter:
     router = APIRouter(tags=["basemap"], dependencies=[NO_QUERY])
 
     @router.get(
@@ -57,7 +59,7 @@ def basemap_router(basemap: ServedBasemap | None) -> APIRouter:
     return router
 
 
-def _add_tile_route(router: APIRouter, basemap: ServedBasemap | None) -> None:
+def _add_tile_route(router: APIRouter, basemap: "ServedBasemap | None") -> None:
     @router.get(
         "/basemap/{z}/{x}/{y}",
         operation_id="get_basemap_tile",
@@ -85,7 +87,7 @@ def _add_tile_route(router: APIRouter, basemap: ServedBasemap | None) -> None:
         return Response(tile, media_type=basemap.file.media_type, headers=headers)
 
 
-def _tile(basemap: ServedBasemap, z: int, x: int, y: int) -> bytes | None:
+def _tile(basemap: "ServedBasemap", z: int, x: int, y: int) -> bytes | None:
     try:
         return basemap.file.tile(z, x, y)
     except UnreadableTileError as error:

@@ -14,6 +14,7 @@ from starlette.routing import BaseRoute, Match, Mount, Route
 from starlette.staticfiles import NotModifiedResponse, PathLike, StaticFiles
 from starlette.types import Scope
 
+from dropanchor_service.api.help.routes import help_routes
 from dropanchor_service.api.http.site_in_path import is_omlox
 from dropanchor_service.api.routes.page_bundle import PROGRAMS, bundle, last_change
 
@@ -79,10 +80,11 @@ ELSEWHERE = {"/openapi.json": "api/v1/openapi.json", "/api/v1/docs": "../../docs
 
 
 def page_mounts(dashboard: Path) -> list[BaseRoute]:
-    """Return the routes of the pages: the interactive documentation with its program, and the dashboard as the last."""
+    """Return the routes of the pages: the documentation, that of REST with its program, and last the dashboard."""
     swagger_ui = _Files(Path(str(files("fastapi_swagger.resources"))))
     leading = [_leading(path, to) for path, to in ELSEWHERE.items()]
-    return [*leading, Mount("/docs/swagger-ui", app=swagger_ui, name="swagger-ui"), DashboardMount(dashboard)]
+    of_rest = Mount("/docs/swagger-ui", app=swagger_ui, name="swagger-ui")
+    return [*leading, *help_routes(), of_rest, DashboardMount(dashboard)]
 
 
 def _leading(path: str, to: str) -> Route:

@@ -15,16 +15,17 @@ from dropanchor_schemas.destinations import (
     Retried,
     WebhookDestination,
 )
+from dropanchor_schemas.sentences import phrase_of, said_by, with_stop
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.http.etags import Conditions
 from dropanchor_service.api.routes import event_examples as examples
-from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.items import CHANGE_KINDS, DestinationId, delete, found, item_response, put
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.delivery import write_only
 from dropanchor_service.delivery.channel import ChannelError, Verdict
+from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.events.deliveries import QueueState
 from dropanchor_service.events.drafts import destination_test
 from dropanchor_service.events.store import cloud_event
@@ -36,9 +37,11 @@ _ONE = (Kind.UNKNOWN_DESTINATION, *_READ)
 def destinations_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["destinations"], dependencies=[NO_QUERY])
     _add_read_routes(router, site_of)
-    _add_change_routes(router, site_of)
+    _add_put_route(router, site_of)
+    _add_delete_route(router, site_of)
     _add_test_route(router, site_of)
-    _add_dead_letter_routes(router, site_of)
+    _add_dead_letter_list_route(router, site_of)
+    _add_dead_letter_change_routes(router, site_of)
     return router
 
 
@@ -48,14 +51,18 @@ def _add_read_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         operation_id="list_destinations",
         summary="List the destinations and the state of their queues",
         response_model=DestinationList,
-        responses=example_response({"destinations": [examples.DESTINATION_STATE]}) | problems(*_READ),
+        responses=example_response({"destinations": [examples.DESTINATION_STATE], "unavailable": {}})
+        | problems(*_READ),
     )
     def list_destinations(request: Request) -> Response:
         parts = site_of.parts(request).events
         with reading():
             queues = parts.deliveries.states()
         states = [_state(parts, one, queues.get(one.id, QueueState())) for one in parts.destinations.all.values()]
-        return json_response({"destinations": [state.model_dump(mode="json") for state in states]})
+        listed = [state.model_dump(mode="json") for state in states]
+        unavailable = parts.channels.unavailable()
+        phrases = {kind: phrase_of(why) for kind, why in unavailable.items()}
+        return json_response({"destinations": listed, "unavailable": unavailable, "unavailable_phrases": phrases})
 
     @router.get(
         "/destinations/{destination}",
@@ -69,13 +76,13 @@ def _add_read_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         return _response(parts, found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION))
 
 
-def _add_change_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_put_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.put(
         "/destinations/{destination}",
         operation_id="put_destination",
         summary="Create or replace a destination",
-        description="It gets the events from now on. A webhook inside needs `allow_networks` in the settings, an "
-        "e-mail a mail server, and MQTT a broker.",
+        description="It gets the events from now on. A webhook inside needs its network among those of receivers: a "
+        "refusal for that names it as `network`. An e-mail needs a mail server, and MQTT a broker.",
         response_model=DestinationState,
         responses=example_response(examples.DESTINATION_STATE)
         | problems(Kind.DESTINATION_REFUSED, *CHANGE_KINDS, *_READ),
@@ -91,6 +98,8 @@ def _add_change_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         put(parts.destinations, destination, body.id, usable, allows)
         return _response(parts, usable)
 
+
+def _add_delete_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.delete(
         "/destinations/{destination}",
         operation_id="delete_destination",
@@ -120,14 +129,14 @@ def _add_test_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         try:
             parts.channels.check_settings(known)
         except ChannelError as error:
-            raise ProblemError(Kind.DESTINATION_REFUSED, f"{error}.") from error
+            raise ProblemError(Kind.DESTINATION_REFUSED, with_stop(said_by(error))) from error
         async with parts.channels.open(known) as channel:
             outcome = (await channel.send([cloud_event(destination_test(known.id), 0, parts.store.site)]))[0]
         answer = {"delivered": outcome.verdict is Verdict.ACCEPTED, "detail": outcome.warning or outcome.detail}
         return json_response(answer)
 
 
-def _add_dead_letter_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_dead_letter_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/destinations/{destination}/dead-letters",
         operation_id="list_dead_letters",
@@ -143,6 +152,8 @@ def _add_dead_letter_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         letters = [{"event": orjson.Fragment(body), "reason": reason} for body, reason in dead]
         return json_response({"dead_letters": letters})
 
+
+def _add_dead_letter_change_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.post(
         "/destinations/{destination}/dead-letters/retry",
         operation_id="retry_dead_letters",
@@ -178,8 +189,11 @@ def _usable(parts: EventParts, destination: Destination) -> Destination:
     try:
         whole = write_only.completed(destination, parts.destinations.all.get(destination.id))
         parts.channels.check(whole)
-    except (ChannelError, write_only.NotShownError) as error:
-        raise ProblemError(Kind.DESTINATION_REFUSED, f"{error}.") from error
+    except ChannelError as error:
+        members = {} if error.network is None else {"network": error.network}
+        raise ProblemError(Kind.DESTINATION_REFUSED, with_stop(said_by(error)), **members) from error
+    except write_only.NotShownError as error:
+        raise ProblemError(Kind.DESTINATION_REFUSED, with_stop(said_by(error))) from error
     return whole
 
 

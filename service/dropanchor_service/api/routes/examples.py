@@ -15,6 +15,11 @@ POSE: dict[str, Any] = {
     "relative_pose": None,
     "x": 3.2,
     "y": -1.7,
+    "z": 1.1,
+    "z_std_m": 0.15,
+    "z_source": "told",
+    "floor": None,
+    "floor_probability": None,
     "heading_rad": 0.61,
     "speed_mps": 1.1,
     "yaw_rate_radps": 0.02,
@@ -28,6 +33,7 @@ POSE: dict[str, Any] = {
     "hypotheses": [],
     "lat": 52.512345678,
     "lon": 13.412345678,
+    "alt_m": None,
     "online": True,
     "epoch": 0,
 }
@@ -36,6 +42,11 @@ EXPLANATION: dict[str, Any] = {
     "hypotheses": [],
     "speed": {"speed_mps": 1.1, "range_rate_mps": 0.82, "predicted_range_rate_mps": 0.79},
     "speed_track": {"t_ns": [1_799_999_999_750_000_000, 1_800_000_000_000_000_000], "speed_mps": [1.08, 1.1]},
+    "height_track": {
+        "t_ns": [1_799_999_999_750_000_000, 1_800_000_000_000_000_000],
+        "z": [1.1, 1.1],
+        "z_std_m": [0.15, 0.15],
+    },
     "innovations": [
         {
             "t_ns": 1_800_000_000_000_000_000,
@@ -69,6 +80,11 @@ POSE_FRAME: dict[str, Any] = {
     "age_s": [0.042, 0.05],
     "x": [3.2, None],
     "y": [-1.7, None],
+    "z": [1.1, None],
+    "z_std_m": [0.15, None],
+    "z_source": ["told", None],
+    "floor": [None, None],
+    "floor_probability": [None, None],
     "heading_rad": [0.61, None],
     "speed_mps": [1.1, None],
     "yaw_rate_radps": [0.02, None],
@@ -86,6 +102,7 @@ TAG_SETTINGS: dict[str, Any] = {
     "colour": "#0b62b8",
     "group": "forklifts",
     "height_m": 1.1,
+    "height_motion": "auto",
     "range_std_m": 0.1,
     "range_bias_m": 0.0,
     "range_bias_std_m": None,
@@ -130,9 +147,9 @@ TAG: dict[str, Any] = {
     "settings": TAG_SETTINGS,
 }
 TAG_LIST: dict[str, Any] = {"t_ns": 1_800_000_000_042_000_000, "tags": [TAG]}
-NEWCOMER_LIST: dict[str, Any] = {
+PENDING_TAG_LIST: dict[str, Any] = {
     "t_ns": 1_800_000_000_042_000_000,
-    "newcomers": [
+    "tags": [
         {
             "tag": "tag-7",
             "first_heard_ns": 1_800_000_000_000_000_000,
@@ -141,6 +158,7 @@ NEWCOMER_LIST: dict[str, Any] = {
         }
     ],
 }
+NEWCOMER_LIST: dict[str, Any] = {"t_ns": PENDING_TAG_LIST["t_ns"], "newcomers": PENDING_TAG_LIST["tags"]}
 ANCHOR: dict[str, Any] = {"id": "1", "x": 0.0, "y": 0.0, "z": 2.5}
 SITE: dict[str, Any] = {
     "id": "default",
@@ -180,12 +198,17 @@ TRACK: dict[str, Any] = {
                     "relative_pose",
                     "x",
                     "y",
+                    "z",
+                    "z_std_m",
+                    "z_source",
+                    "floor",
+                    "floor_probability",
                     "heading_rad",
                     "speed_mps",
                     "yaw_rate_radps",
                     "p_mode",
                 ),
-                *("sigma_pos_m", "sigma_obs_m", "range_m", "covariance", "anchor", "lat", "lon", "epoch"),
+                *("sigma_pos_m", "sigma_obs_m", "range_m", "covariance", "anchor", "lat", "lon", "alt_m", "epoch"),
             )
         }
     ],
@@ -209,6 +232,11 @@ TRACKS: dict[str, Any] = {
                 "relative_pose": [None, None],
                 "x": [3.25, 4.5],
                 "y": [-1.5, 2.0],
+                "z": [1.1, 1.1],
+                "z_std_m": [0.15, 0.15],
+                "z_source": ["told", "told"],
+                "floor": [None, None],
+                "floor_probability": [None, None],
                 "heading_rad": [1.57, 0.0],
                 "speed_mps": [1.1, 0.0],
                 "sigma_pos_m": [0.2, 0.17],

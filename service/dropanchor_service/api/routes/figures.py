@@ -14,11 +14,11 @@ from dropanchor_service.answers.many_tracks import NO_FIGURES, figures_of
 from dropanchor_service.api.formats.figures import figures_csv
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.contents import TEXT
-from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.parameters import COMMA, Ids, example_response, ids_of, json_response
 from dropanchor_service.api.routes.period import TagsInPeriod, history_of, limits_of, selected_tags, unreadable
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.events.stays import TimeInZone, times_in_zones
 from dropanchor_service.history.errors import HistoryError, TooMuchError
 from dropanchor_service.history.overview import Overview

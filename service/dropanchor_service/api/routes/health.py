@@ -8,6 +8,7 @@ from prometheus_client.exposition import choose_encoder
 from starlette.responses import Response
 
 from dropanchor_schemas.answers import Health
+from dropanchor_schemas.sentences import phrase_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.contents import TEXT
 from dropanchor_service.api.routes.parameters import NO_QUERY, json_response
@@ -39,8 +40,10 @@ def health_router(ready: Ready, impaired: Impaired) -> APIRouter:
     def get_ready() -> Response:
         ok, reasons = ready()
         if not ok:
-            raise ProblemError(Kind.NOT_READY, "; ".join(reasons), reasons=list(reasons))
-        return json_response({"status": "ready", "impaired": list(impaired())})
+            detail = reasons[0] if len(reasons) == 1 else "; ".join(reasons)
+            raise ProblemError(Kind.NOT_READY, detail, reasons=list(reasons))
+        found = list(impaired())
+        return json_response({"status": "ready", "impaired": found, "impaired_phrases": list(map(phrase_of, found))})
 
     return router
 

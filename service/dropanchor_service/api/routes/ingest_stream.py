@@ -14,9 +14,12 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from dropanchor_schemas.answers import SamplesAcknowledged
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_schemas.pose import Phrase
+from dropanchor_schemas.sentences import said_by, say
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Rejection
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, identify, key_command, speaks_in
+from dropanchor_service.api.http.closing import reason_of
 from dropanchor_service.api.http.connections import OpenConnections, TooManyConnectionsError
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.http.rates import RateLimiter
@@ -30,7 +33,6 @@ KEY_PROTOCOL = "dropanchor.key."
 """A browser cannot set headers of a WebSocket: it offers its key as a second protocol that begins with this."""
 CONNECTIONS_PER_KEY = 8
 STATE_S = 1.0  # how old the state of the tag in an acknowledgement may be
-MAX_REASON_BYTES = 123
 
 RESTART = 1012
 UNREADABLE, UNAUTHENTICATED, FORBIDDEN, TOO_MANY = 4400, 4401, 4403, 4429
@@ -42,7 +44,7 @@ class _ClosedError(Exception):
     def __init__(self, code: int, reason: str) -> None:
         super().__init__(reason)
         self.code = code
-        self.reason = reason.encode()[:MAX_REASON_BYTES].decode(errors="ignore")
+        self.reason = reason
 
 
 class _Acknowledgements:
@@ -76,6 +78,7 @@ class _Acknowledgements:
             tag=self._tag,
             state=self._state[0],
             hint=self._state[1],
+            hint_phrase=Phrase.of(self._state[1]),
         ).model_dump_json()
 
     def _refresh_state(self) -> None:
@@ -129,27 +132,39 @@ class _Stream:
             return None
         secret = bearer_of(socket) or key_among_protocols(socket)
         if not secret:
-            raise _ClosedError(UNAUTHENTICATED, f"This service needs a key. Make a key with {self._key_command}.")
+            raise _ClosedError(
+                UNAUTHENTICATED,
+                say("needs_key", "This service needs a key. Make a key with {command}.", command=self._key_command),
+            )
         try:
             return await identify(self._authenticator, secret)
         except UnauthenticatedError as error:
-            raise _ClosedError(UNAUTHENTICATED, f"Not accepted: {error}.") from error
+            raise _ClosedError(
+                UNAUTHENTICATED, say("not_accepted", "Not accepted: {why}.", why=said_by(error))
+            ) from error
 
     def _tag(self, socket: WebSocket, identity: Identity | None) -> str:
         """Return the tag that a connection speaks for: that of its key, or without credentials the one it names."""
         named = socket.query_params.get("tag")
         own = None if identity is None else identity.tag
         if identity is not None and own is None:
-            raise _ClosedError(FORBIDDEN, f"This key may not send samples. Make a key with {self._key_command}.")
+            raise _ClosedError(
+                FORBIDDEN,
+                say(
+                    "no_ingest", "This key may not send samples. Make a key with {command}.", command=self._key_command
+                ),
+            )
         if own is not None and named not in (None, own):
-            raise _ClosedError(FORBIDDEN, f"This key speaks for the tag {own!r} only.")
+            raise _ClosedError(FORBIDDEN, say("other_tag", "This key speaks for the tag {tag} only.", tag=repr(own)))
         tag = own or named
         if tag is None:
-            raise _ClosedError(UNREADABLE, "Say which tag this is: add ?tag=NAME to the URL.")
+            raise _ClosedError(UNREADABLE, say("which_tag", "Say which tag this is: add ?tag=NAME to the URL."))
         try:
             chunk_from_id(tag)
         except InvalidKeyError as error:
-            raise _ClosedError(UNREADABLE, f"The tag's name cannot be used: {error}.") from error
+            raise _ClosedError(
+                UNREADABLE, say("tag_name", "The tag's name cannot be used: {why}.", why=said_by(error))
+            ) from error
         return tag
 
     def _site(self, socket: WebSocket, identity: Identity | None) -> SiteParts:
@@ -159,12 +174,17 @@ class _Stream:
         try:
             site = self._site_of.parts(socket)
         except ProblemError as error:
-            unnamed = "Say which site this is: add ?site=SITE to the address of the page."
+            unnamed = say("which_site", "Say which site this is: add ?site=SITE to the address of the page.")
             raise _ClosedError(UNREADABLE, unnamed if error.kind is Kind.SEVERAL_SITES else error.detail) from error
         if identity is not None and not speaks_in(identity, site.id, self._site_of.only is None):
             raise _ClosedError(
                 FORBIDDEN,
-                f"This key may not send samples to the site {site.id!r}. Make a key with {self._key_command}.",
+                say(
+                    "no_ingest_site",
+                    "This key may not send samples to the site {site}. Make a key with {command}.",
+                    site=repr(site.id),
+                    command=self._key_command,
+                ),
             )
         return site
 
@@ -178,14 +198,19 @@ class _Stream:
     def _require_open(self, identity: Identity | None) -> None:
         """Raise _ClosedError once the service stops or the key is no longer valid."""
         if self._stopping.is_set():
-            raise _ClosedError(RESTART, "The service stops. Connect again and send this message again.")
+            raise _ClosedError(RESTART, say("stops", "The service stops. Connect again and send this message again."))
         if (
             identity is not None
             and self._authenticator is not None
             and not self._authenticator.is_still_valid(identity)
         ):
             raise _ClosedError(
-                UNAUTHENTICATED, f"The key was revoked or has expired. Make a key with {self._key_command}."
+                UNAUTHENTICATED,
+                say(
+                    "key_ended",
+                    "The key was revoked or has expired. Make a key with {command}.",
+                    command=self._key_command,
+                ),
             )
 
 
@@ -204,9 +229,14 @@ def ingest_stream_router(
         try:
             await stream.serve(socket)
         except TooManyConnectionsError:
-            await socket.close(TOO_MANY, f"This key has {CONNECTIONS_PER_KEY} connections: end one, or make more keys.")
+            too_many = say(
+                "too_many",
+                "This key has {connections} connections: end one, or make more keys.",
+                connections=CONNECTIONS_PER_KEY,
+            )
+            await socket.close(TOO_MANY, reason_of(too_many, socket.scope))
         except _ClosedError as end:
-            await socket.close(end.code, end.reason)
+            await socket.close(end.code, reason_of(end.reason, socket.scope))
         except WebSocketDisconnect:
             pass
 

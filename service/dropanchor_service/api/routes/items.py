@@ -7,6 +7,7 @@ from fastapi import Depends, Path
 from pydantic import BaseModel
 from starlette.responses import Response
 
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import ID_SCHEMA
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.http.etags import etag_of
@@ -59,12 +60,22 @@ def found(items: NamedItems[Item], name: str, unknown: Kind) -> Item:
 def put(items: NamedItems[Item], name: str, body_id: str, item: Item, allows: Precondition) -> None:
     """Save the item. Raises ProblemError."""
     if body_id != name:
-        raise ProblemError(Kind.ID_DIFFERS, f"The id is {name!r} in the path and {body_id!r} in the body.")
+        raise ProblemError(
+            Kind.ID_DIFFERS,
+            say(
+                "id_differs",
+                "The id is {path} in the path and {body} in the body.",
+                path=repr(name),
+                body=repr(body_id),
+            ),
+        )
     with saving():
         try:
             items.put(name, item, allows)
         except FullError as error:
-            raise ProblemError(Kind.ITEMS_FULL, f"There are {len(items.all)} already. Delete one first.") from error
+            raise ProblemError(
+                Kind.ITEMS_FULL, say("items_full", "There are {n} already. Delete one first.", n=len(items.all))
+            ) from error
 
 
 def delete(items: NamedItems[Item], name: str, allows: Precondition, unknown: Kind) -> Response:
@@ -78,4 +89,4 @@ def delete(items: NamedItems[Item], name: str, allows: Precondition, unknown: Ki
 
 
 def _unknown(name: str, kind: Kind) -> ProblemError:
-    return ProblemError(kind, f"There is none with the id {name!r}.")
+    return ProblemError(kind, say("item_unknown", "There is none with the id {id}.", id=repr(name)))

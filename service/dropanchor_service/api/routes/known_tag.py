@@ -1,5 +1,6 @@
 """Look up the tag that a request names."""
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.store.tags import Tag
@@ -16,6 +17,10 @@ def known_tag(answers: Answers, name: str) -> Tag:
 def unknown_tag(name: str) -> ProblemError:
     return ProblemError(
         Kind.UNKNOWN_TAG,
-        f"No message of tag {name!r} was accepted, and it is not configured. "
-        "The log of the service names the messages that it rejects.",
+        say(
+            "tag_unknown",
+            "No message of tag {tag} was accepted, and it is not configured. The log of the service "
+            "names the messages that it rejects.",
+            tag=repr(name),
+        ),
     )

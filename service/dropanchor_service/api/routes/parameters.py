@@ -11,6 +11,7 @@ from starlette.responses import Response
 
 from dropanchor_schemas.keys import InvalidKeyError, checked_id
 from dropanchor_schemas.pose import TrackingState
+from dropanchor_schemas.sentences import said_by, say
 from dropanchor_schemas.site import ID_SCHEMA, Label
 from dropanchor_schemas.times import ns_of_parameter
 from dropanchor_service.answers.answers import to_json
@@ -36,7 +37,8 @@ async def refuse_query(request: Request) -> None:
     if request.query_params:
         name = next(iter(request.query_params))
         raise ProblemError(
-            Kind.INVALID_REQUEST, f"query.{name[:64]}: is unknown; this resource takes no query parameters"
+            Kind.INVALID_REQUEST,
+            say("query_unknown", "query.{name}: is unknown; this resource takes no query parameters", name=name[:64]),
         )
 
 
@@ -54,9 +56,13 @@ def id_of(escaped: str) -> str:
         identifier = unquote(escaped, errors="strict")
         checked_id(identifier)
     except UnicodeDecodeError as error:
-        raise ProblemError(Kind.INVALID_REQUEST, "The id in the path is not percent-escaped UTF-8.") from error
+        raise ProblemError(
+            Kind.INVALID_REQUEST, say("path_escapes", "The id in the path is not percent-escaped UTF-8.")
+        ) from error
     except InvalidKeyError as error:
-        raise ProblemError(Kind.INVALID_REQUEST, f"The id in the path is not valid: {error}.") from error
+        raise ProblemError(
+            Kind.INVALID_REQUEST, say("path_id", "The id in the path is not valid: {why}.", why=said_by(error))
+        ) from error
     return identifier
 
 
@@ -195,6 +201,10 @@ def saving() -> Iterator[None]:
     try:
         yield
     except ChangedMeanwhileError as error:
-        raise ProblemError(Kind.CHANGED_MEANWHILE, "Somebody changed this meanwhile: get it and try again.") from error
+        raise ProblemError(
+            Kind.CHANGED_MEANWHILE, say("changed_meanwhile", "Somebody changed this meanwhile: get it and try again.")
+        ) from error
     except OSError as error:
-        raise ProblemError(Kind.NOT_SAVED, f"The change was not made: {error.strerror or error}.") from error
+        raise ProblemError(
+            Kind.NOT_SAVED, say("not_saved", "The change was not made: {why}.", why=error.strerror or error)
+        ) from error

@@ -65,11 +65,16 @@ def limits_of(period: Period, now_ns: int) -> tuple[int, int]:
     """Return the start and the end of the period, both included. Raises ProblemError."""
     to_ns = now_ns if period.to_ns is None else period.to_ns
     from_ns = max(0, to_ns - HOUR_NS) if period.from_ns is None else period.from_ns
-    if from_ns > to_ns:
-        raise ProblemError(Kind.INVALID_REQUEST, "query.from: is later than `to`")
+    require_order(from_ns, to_ns)
     if to_ns - from_ns > MAX_PERIOD_NS:
         raise ProblemError(Kind.INVALID_REQUEST, "query.from: is more than 31 days before `to`")
     return from_ns, to_ns
+
+
+def require_order(from_ns: int, to_ns: int) -> None:
+    """Raise ProblemError when the period ends before it begins."""
+    if from_ns > to_ns:
+        raise ProblemError(Kind.INVALID_REQUEST, "query.from: is later than `to`")
 
 
 def history_of(answers: Answers) -> Tracks:

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
 from dropanchor_schemas.plans import PlanImage, UploadedPlanImage
+from dropanchor_schemas.sentences import said_by, say
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import plan_examples as examples
 from dropanchor_service.api.routes.contents import BYTES
@@ -93,11 +94,13 @@ def _add_upload_route(router: APIRouter, site_of: SiteOfRequest) -> None:
             media_type = file_type_of(content, request.headers.get("content-type", ""))
             read = await reader.read(content, query.to_read(media_type, parts.answers.site))
         except RefusedError as error:
-            raise ProblemError(Kind.PLAN_IMAGE_REFUSED, str(error)) from error
+            raise ProblemError(Kind.PLAN_IMAGE_REFUSED, said_by(error)) from error
         with saving():
             image = await run_in_threadpool(parts.plans.add_image, read)
         found = read.description
-        uploaded = UploadedPlanImage(image=image, pages=found.pages, placement=found.placement, note=found.note)
+        uploaded = UploadedPlanImage(
+            image=image, pages=found.pages, placement=found.placement, note=found.note, note_phrase=found.note_phrase
+        )
         return json_response(uploaded.model_dump(), status=201)
 
 
@@ -122,7 +125,7 @@ def _add_image_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         known = store.image(image)
         content = None if known is None else _content(store, known)
         if known is None or content is None:
-            raise ProblemError(Kind.UNKNOWN_PLAN_IMAGE, "There is no such image. Upload it again.")
+            raise ProblemError(Kind.UNKNOWN_PLAN_IMAGE, say("plan_gone", "There is no such image. Upload it again."))
         headers = _HEADERS | {"etag": f'"{known.id}"'}
         return Response(content, media_type=known.media_type, headers=headers)
 
@@ -131,7 +134,9 @@ def _content(store: PlanStore, image: PlanImage) -> bytes | None:
     try:
         return store.content(image)
     except OSError as error:
-        raise ProblemError(Kind.NOT_SAVED, f"The image cannot be read: {error.strerror or error}.") from error
+        raise ProblemError(
+            Kind.NOT_SAVED, say("plan_unreadable", "The image cannot be read: {why}.", why=error.strerror or error)
+        ) from error
 
 
 def _binary(*media_types: str) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from fastapi import APIRouter, Request
 
 from dropanchor_schemas.plans import Plan, PlanList
+from dropanchor_schemas.sentences import say
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.routes import plan_examples as examples
 from dropanchor_service.api.routes.item_routes import Resource, add_item_routes
@@ -19,7 +20,9 @@ def plans_router(site_of: SiteOfRequest) -> APIRouter:
 def _plans(site_of: SiteOfRequest) -> Resource[Plan]:
     def check_image(plan: Plan, request: Request) -> None:
         if site_of.parts(request).plans.image(plan.image.id) != plan.image:
-            detail = "Upload the image with POST /api/v1/plan-images, and put `image` of the answer here."
+            detail = say(
+                "plan_upload", "Upload the image with POST /api/v1/plan-images, and put `image` of the answer here."
+            )
             raise ProblemError(Kind.IMAGE_NOT_UPLOADED, detail)
 
     return Resource(

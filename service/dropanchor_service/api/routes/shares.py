@@ -7,6 +7,7 @@ from urllib.parse import quote
 from fastapi import APIRouter, Body, Path, Request
 from starlette.responses import Response
 
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.shares import NewShare, Share, ShareList, ShareRequest
 from dropanchor_service.api.http.behind_proxy import prefix_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
@@ -69,21 +70,30 @@ def _add_create_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLin
     ) -> Response:
         site = site_of.parts(request).id
         if links is None:
-            raise ProblemError(
-                Kind.NO_ACCESS_CONTROL,
-                "Without access control everybody sees everything: send the address of the page. To share less, set "
-                "`security.folder` and `data_dir`.",
-            )
+            raise _no_access_control()
         try:
             with saving():
                 share, secret = links.add(site, body)
         except TooManyLinksError as error:
-            raise ProblemError(Kind.ITEMS_FULL, f"There are {MAX_LINKS} share links: revoke some.") from error
+            raise ProblemError(
+                Kind.ITEMS_FULL, say("shares_full", "There are {n} share links: revoke some.", n=MAX_LINKS)
+            ) from error
         page = prefix_of(request) + ("/" if site_of.only else f"/?site={quote(site, safe='')}")
         view = f"{body.view}&" if body.view else ""
         return json_response(
             share.model_dump() | {"secret": secret, "path": f"{page}#{view}share={secret}"}, status=201
         )
+
+
+def _no_access_control() -> ProblemError:
+    return ProblemError(
+        Kind.NO_ACCESS_CONTROL,
+        say(
+            "no_access_control",
+            "Without access control everybody sees everything: send the address of the page. To share "
+            "less, set `security.folder` and `data_dir`.",
+        ),
+    )
 
 
 def _add_revoke_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLinks | None) -> None:
@@ -101,4 +111,6 @@ def _add_revoke_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLin
         with saving():
             is_known = links is not None and links.revoke(site, share)
         if not is_known:
-            raise ProblemError(Kind.UNKNOWN_SHARE, "There is no such share link. GET /api/v1/shares lists them.")
+            raise ProblemError(
+                Kind.UNKNOWN_SHARE, say("share_unknown", "There is no such share link. GET /api/v1/shares lists them.")
+            )

@@ -10,7 +10,7 @@ from dropanchor_service.api.http.permissions import Need
 
 _LABELS = frozenset({"name", "colour", "group"})
 _SETTINGS = {Need.LINK_TO_TAGS: _LABELS, Need.LINK: _LABELS | {"height_m"}}
-"""Settings that a link reads. The page chooses the floor of a tag by its height."""
+"""Settings that a link reads. The page draws the ring of a range by the height."""
 _HIDDEN: Answer = {
     "health": None,
     "clock_offset": None,

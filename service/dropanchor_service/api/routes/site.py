@@ -6,6 +6,7 @@ from fastapi import APIRouter, Body, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.answers import AnchorList
+from dropanchor_schemas.sentences import said_by, say
 from dropanchor_schemas.site import Anchor, Site
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.http.etags import Conditions
@@ -27,7 +28,8 @@ def site_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
     _add_site_routes(router, site_of)
     _add_anchor_routes(router, site_of)
-    _add_anchor_change_routes(router, site_of)
+    _add_put_anchor_route(router, site_of)
+    _add_delete_anchor_route(router, site_of)
     return router
 
 
@@ -57,7 +59,7 @@ def _add_site_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
             try:
                 site_of(request).site.set_site(body, allows)
             except ValueError as error:
-                raise ProblemError(Kind.SITE_ID_FIXED, str(error)) from error
+                raise ProblemError(Kind.SITE_ID_FIXED, said_by(error)) from error
         return resource_response(body)
 
 
@@ -88,7 +90,7 @@ def _add_anchor_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         return resource_response(known)
 
 
-def _add_anchor_change_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_put_anchor_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.put(
         "/anchors/{anchor}",
         operation_id="put_anchor",
@@ -104,11 +106,21 @@ def _add_anchor_change_routes(router: APIRouter, site_of: SiteOfRequest) -> None
         request: Request,
     ) -> Response:
         if body.id != anchor:
-            raise ProblemError(Kind.ANCHOR_ID_DIFFERS, f"The id is {anchor!r} in the path and {body.id!r} in the body.")
+            raise ProblemError(
+                Kind.ANCHOR_ID_DIFFERS,
+                say(
+                    "id_differs",
+                    "The id is {path} in the path and {body} in the body.",
+                    path=repr(anchor),
+                    body=repr(body.id),
+                ),
+            )
         with saving():
             site_of(request).site.set_anchor(body, allows)
         return resource_response(body)
 
+
+def _add_delete_anchor_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.delete(
         "/anchors/{anchor}",
         operation_id="delete_anchor",
@@ -126,4 +138,6 @@ def _add_anchor_change_routes(router: APIRouter, site_of: SiteOfRequest) -> None
 
 
 def _unknown(anchor: str) -> ProblemError:
-    return ProblemError(Kind.UNKNOWN_ANCHOR, f"The site has no anchor {anchor!r}.")
+    return ProblemError(
+        Kind.UNKNOWN_ANCHOR, say("anchor_unknown", "The site has no anchor {anchor}.", anchor=repr(anchor))
+    )

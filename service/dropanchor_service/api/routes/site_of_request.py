@@ -4,7 +4,8 @@ from collections.abc import Callable, Iterator, Sequence
 from threading import Lock
 from typing import Annotated, Generic, TypeVar
 
-from fastapi import Depends, Path
+from fastapi import Path
+from fastapi.dependencies.utils import get_dependant
 from starlette.requests import HTTPConnection
 
 from dropanchor_schemas.site import ID_SCHEMA
@@ -25,7 +26,7 @@ async def _describe_site(
     """Put the parameter into the interface document."""
 
 
-SITE_IN_PATH = Depends(_describe_site)
+SITE_IN_PATH = get_dependant(path=SITE_PREFIX, call=_describe_site)
 
 
 class SiteOfRequest:

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 from dropanchor_service.answers.answers import Answers
-from dropanchor_service.api.omlox.items import OmloxItems
-from dropanchor_service.api.routes.event_parts import EventParts
+from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.phones.intake import Receive
 from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.recorder import Recorder
+from dropanchor_service.store.omlox_items import OmloxItems
 
 
 @dataclass(frozen=True)

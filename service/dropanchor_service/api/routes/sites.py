@@ -1,6 +1,8 @@
 """The sites that the service serves, and the routes that each of them has."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
+from dataclasses import replace
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
@@ -13,6 +15,7 @@ from dropanchor_service.answers.answers import to_json
 from dropanchor_service.answers.site_summaries import summaries
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.below import below
 from dropanchor_service.api.routes.parameters import NO_QUERY, PoseQuery, example_response, json_response
 from dropanchor_service.api.routes.poses import in_pieces
 from dropanchor_service.api.routes.site_of_request import SITE_IN_PATH, SITE_PREFIX, SiteOfRequest
@@ -26,21 +29,28 @@ def sites_router(site_of: SiteOfRequest, routers: Iterable[APIRouter]) -> APIRou
     _add_list_route(router, site_of)
     _add_poses_route(router, site_of)
     for routes in routers:
-        for route in _api_routes(routes):
-            route.operation_id = route.unique_id = f"{route.operation_id}_of_site"
-            route.responses = _with_unknown_site(route.responses)
-        router.include_router(routes, prefix=SITE_PREFIX, dependencies=[SITE_IN_PATH])
+        of_site = below(SITE_PREFIX, routes.routes)
+        for route in of_site:
+            if isinstance(route, APIRoute):
+                _describe(route)
+        router.routes.extend(of_site)
     return router
+
+
+def _describe(route: APIRoute) -> None:
+    """Give a route below a site an id of its own, the site among its parameters, and the refusal of an unknown one."""
+    route.operation_id = route.unique_id = f"{route.operation_id}_of_site"
+    if route.response_field is not None:  # its name is the title of the schema
+        route.response_field = copy(route.response_field)
+        route.response_field.name = f"Response_{route.unique_id}"
+    route.dependant = replace(route.dependant, dependencies=[SITE_IN_PATH, *route.dependant.dependencies])
+    route.responses = _with_unknown_site(route.responses)
 
 
 def _with_unknown_site(responses: dict[int | str, dict[str, Any]]) -> dict[int | str, dict[str, Any]]:
     unknown = problems(Kind.UNKNOWN_SITE)[404]
     others = responses.get(404, {}).get("description", "")
     return responses | {404: unknown | {"description": f"{unknown['description']} {others}".rstrip()}}
-
-
-def _api_routes(router: APIRouter) -> Iterator[APIRoute]:
-    return (route for route in router.routes if isinstance(route, APIRoute))
 
 
 def _add_list_route(router: APIRouter, sites: SiteOfRequest) -> None:

@@ -6,14 +6,15 @@ from typing import Annotated
 from fastapi import APIRouter, Body, Query, Request
 from starlette.responses import Response
 
-from dropanchor_schemas.answers import NewcomerList, TagList, TimedTagStatus
+from dropanchor_schemas.answers import NewcomerList, PendingTagList, TagList, TimedTagStatus
 from dropanchor_schemas.keys import InvalidKeyError, refuse_pattern
+from dropanchor_schemas.sentences import phrase_of, said_by, say
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.answers.care import care_of, health_answer
 from dropanchor_service.answers.times import iso_utc
-from dropanchor_service.api.http.errors import Kind, ProblemError, problems
-from dropanchor_service.api.http.etags import Conditions
+from dropanchor_service.api.http.errors import Kind, ProblemError, at, problems
+from dropanchor_service.api.http.etags import Conditions, etag_of
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import (
@@ -42,9 +43,10 @@ def tags_router(site_of: SiteOfRequest) -> APIRouter:
 
 def tag_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
-    _add_newcomers_route(router, site_of)
+    _add_pending_routes(router, site_of)
     _add_status_route(router, site_of)
-    _add_settings_routes(router, site_of)
+    _add_get_settings_route(router, site_of)
+    _add_put_settings_route(router, site_of)
     _add_delete_route(router, site_of)
     return router
 
@@ -67,20 +69,32 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         return json_response({"t_ns": now_ns, "tags": list(map(show, _statuses(answers, tags, offsets, now_ns)))})
 
 
-def _add_newcomers_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_pending_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
-        "/newcomers",
-        operation_id="list_newcomers",
+        "/pending-tags",
+        operation_id="list_pending_tags",
         summary="List tags that have sent messages but are not admitted yet",
         description='With `unknown_tags = "quarantine"`, a tag stays in this list until you put its settings (`{}` is '
         "enough). With `accept`, a tag stays only while many tags are new at once, until its second message. The list "
         "holds up to `max_tags` tags, those that sent most recently. A restart clears it.",
+        response_model=PendingTagList,
+        responses=example_response(examples.PENDING_TAG_LIST) | problems(Kind.INVALID_REQUEST),
+    )
+    def list_pending_tags(request: Request) -> Response:
+        answers = site_of(request)
+        return json_response({"t_ns": answers.now_ns(), "tags": _pending(answers)})
+
+    @router.get(
+        "/newcomers",
+        operation_id="list_newcomers",
+        summary="The former name of /pending-tags, until the next version",
+        deprecated=True,
         response_model=NewcomerList,
         responses=example_response(examples.NEWCOMER_LIST) | problems(Kind.INVALID_REQUEST),
     )
     def list_newcomers(request: Request) -> Response:
         answers = site_of(request)
-        return json_response({"t_ns": answers.now_ns(), "newcomers": _newcomers(answers)})
+        return json_response({"t_ns": answers.now_ns(), "newcomers": _pending(answers)})
 
 
 def _add_status_route(router: APIRouter, site_of: SiteOfRequest) -> None:
@@ -99,7 +113,7 @@ def _add_status_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         return json_response(_timed(shown_to(request)(status)))
 
 
-def _add_settings_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_get_settings_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/tags/{tag}/settings",
         operation_id="get_tag_settings",
@@ -111,6 +125,8 @@ def _add_settings_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         answers = site_of(request)
         return resource_response(answers.site.tag_settings(known_tag(answers, tag).name))
 
+
+def _add_put_settings_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.put(
         "/tags/{tag}/settings",
         operation_id="put_tag_settings",
@@ -140,7 +156,9 @@ def _add_delete_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         operation_id="delete_tag",
         summary="Delete a tag: its settings, its counters and its pose",
         description="Its stored tracks stay. A tag that still sends is unknown from then on. With "
-        '`unknown_tags = "accept"`, it is back with its next message, with the settings in `tag_defaults`.',
+        '`unknown_tags = "accept"`, it is back with its next message, with the settings in `tag_defaults`. The `ETag` '
+        "of the answer is that of those settings: as the `If-Match` of a `PUT` of the settings, it undoes the deletion "
+        "unless somebody has set others since.",
         status_code=204,
         responses=problems(Kind.UNKNOWN_TAG, Kind.CHANGED_MEANWHILE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
     )
@@ -150,7 +168,7 @@ def _add_delete_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         with saving():
             answers.site.remove_tag(known.name, answers.now_ns(), allows)
         answers.forget(known)
-        return Response(status_code=204)
+        return Response(status_code=204, headers={"etag": etag_of(answers.site.tag_settings(tag))})
 
 
 def register_tag(answers: Answers, tag: str, settings: TagSettings, max_tags: int, allows: Precondition) -> None:
@@ -158,9 +176,12 @@ def register_tag(answers: Answers, tag: str, settings: TagSettings, max_tags: in
     try:
         refuse_pattern(tag)
     except InvalidKeyError as error:
-        raise ProblemError(Kind.INVALID_REQUEST, f"path.tag: {error}") from error
+        raise ProblemError(Kind.INVALID_REQUEST, at("path.tag", said_by(error))) from error
     if answers.tags.find(tag) is None and len(answers.tags) >= max_tags:
-        raise ProblemError(Kind.TAGS_FULL, f"{max_tags} tags are registered already. Raise `max_tags` to allow more.")
+        raise ProblemError(
+            Kind.TAGS_FULL,
+            say("tags_full", "{n} tags are registered already. Raise `max_tags` to allow more.", n=max_tags),
+        )
     with saving():
         answers.site.set_tag(tag, settings, allows)
     answers.tags.register(tag)
@@ -175,8 +196,8 @@ def remote_answer(answers: Answers, tag: Tag) -> Answer:
     }
 
 
-def _newcomers(answers: Answers) -> list[Answer]:
-    """Return the `Newcomer` of each pending tag."""
+def _pending(answers: Answers) -> list[Answer]:
+    """Return the `PendingTag` of each tag that waits."""
     return [
         {
             "tag": tag.name,
@@ -214,7 +235,8 @@ def _statuses(
             "used": dict(tag.used),
             "rejected": {name: count for name, count in zip(_REASON_NAMES, rejected.tolist(), strict=True) if count},
             "lag_s": float(answers.tags.rows.lag_s(tag.row)),
-            "hint": answers.hint_of(tag),
+            "hint": (hint := answers.hint_of(tag)),
+            "hint_phrase": phrase_of(hint),
             "unknown_anchor": answers.unknown_anchor_of(tag),
             "health": health_answer(answers.health.of(tag.row), now_ns),
             "clock_offset": None if offset is None else offset.answer(),

@@ -8,6 +8,7 @@ from pydantic import Field, field_validator
 from starlette.responses import Response
 
 from dropanchor_schemas.geojson import TrackFeatureCollection
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.track import Track
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.answers.track_pages import TrackPage, track_page
@@ -22,9 +23,11 @@ from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.history.errors import HistoryError
 
 MAX_POSES = 10_000
-_PARQUET_IS_A_FILE = (
-    "Parquet comes as one file, not page by page: /api/v1/tags/TAG/track/file?format=parquet. It needs the extra "
-    "`parquet` of the service: pip install 'dropanchor-service[parquet]'"
+_PARQUET_IS_A_FILE = say(
+    "parquet_is_a_file",
+    "Parquet comes as one file, not page by page: {path}. It needs the extra `parquet` of the service: {command}",
+    path="/api/v1/tags/TAG/track/file?format=parquet",
+    command="pip install 'dropanchor-service[parquet]'",
 )
 
 _DESCRIPTION = """\

@@ -44,7 +44,8 @@ def tracks_router(site_of: SiteOfRequest) -> APIRouter:
         from_ns, to_ns = limits_of(query, answers.now_ns())
         tracks = history_of(answers)
         try:
-            return json_response(many_tracks(tracks, query.tags or None, from_ns, to_ns, query.max_points))
+            floors = answers.site.floors
+            return json_response(many_tracks(tracks, floors, query.tags or None, from_ns, to_ns, query.max_points))
         except TooMuchError as error:
             raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
         except HistoryError as error:

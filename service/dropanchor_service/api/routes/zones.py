@@ -2,8 +2,9 @@
 
 from fastapi import APIRouter, Request
 
+from dropanchor_schemas.sentences import said_by, with_stop
 from dropanchor_schemas.zones import EventRule, EventRuleList, Zone, ZoneList
-from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.http.errors import Kind, ProblemError, at
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.item_routes import Resource, add_item_routes
 from dropanchor_service.api.routes.parameters import NO_QUERY
@@ -52,4 +53,4 @@ def _check_shape(zone: Zone, _: Request) -> None:
     try:
         vertices_of(zone.shape)
     except ShapeError as error:
-        raise ProblemError(Kind.SHAPE_REFUSED, f"body.shape: {error}.") from error
+        raise ProblemError(Kind.SHAPE_REFUSED, at("body.shape", with_stop(said_by(error)))) from error

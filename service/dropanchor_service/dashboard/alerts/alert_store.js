@@ -1,7 +1,7 @@
 /** The destinations with the state of their queues, and the rules. */
 
 import { requestChange } from "../data/access.js";
-import { getJson } from "../data/connection.js";
+import { api, getJson } from "../data/connection.js";
 import { Items } from "../data/items.js";
 import { Refreshed } from "../data/refreshed.js";
 import { shareToken } from "../data/shared.js";
@@ -16,15 +16,29 @@ export class AlertStore extends Refreshed {
   states = [];
   /** @type {Item[]} */
   allRules = [];
+  /** Why destinations of some types cannot be made, by their types. @type {Record<string, string>} */
+  unavailable = {};
+  /** @type {Record<string, import("../i18n/said.js").Phrase | null>} */
+  unavailable_phrases = {};
+  /** Networks inside whose machines may receive events. @type {{network: string, in_settings: boolean}[]} */
+  networks = [];
 
   get paths() {
-    return ["event-rules", ...(shareToken === null ? ["destinations"] : [])];
+    return ["event-rules", ...(shareToken === null ? ["destinations", "receiver-networks"] : [])];
   }
 
   /** @param {any[]} answers without the destinations for a share link, which may not read them */
-  take([rules, destinations]) {
+  take([rules, destinations, networks]) {
     if (rules) this.allRules = rules.rules;
-    if (destinations) this.states = destinations.destinations;
+    if (destinations) ({ destinations: this.states, unavailable: this.unavailable, unavailable_phrases: this.unavailable_phrases } = destinations);
+    if (networks) this.networks = networks.networks;
+  }
+
+  /** Let the machines of a network receive events, or no longer. Throws Error with the sentence of the service.
+   * @param {string} network @param {"PUT" | "DELETE"} method */
+  async setNetwork(network, method) {
+    await requestChange(api(`receiver-networks/${encodeURIComponent(network.trim())}`), method);
+    await this.refresh();
   }
 
   /** Send a test event. Return what the receiver answered. @param {string} id @returns {Promise<{delivered: boolean, detail: string}>} */

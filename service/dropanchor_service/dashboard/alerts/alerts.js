@@ -1,6 +1,7 @@
 /** Connect alerts: who is told about events, and the rules that make them. */
 
 import { listLanguages } from "../i18n/document.js";
+import { begun, said } from "../i18n/said.js";
 import { language, t } from "../i18n/language.js";
 import { shareToken } from "../data/shared.js";
 import { confirmed } from "../setup/confirm.js";
@@ -8,7 +9,9 @@ import { AlertStore } from "./alert_store.js";
 import { DestinationList } from "./destination_list.js";
 import { ItemEditor } from "./item_editor.js";
 import { ItemForm } from "./item_form.js";
+import { NetworkList } from "./network_list.js";
 import { RuleList } from "./rule_list.js";
+import { SecretField, newSecret } from "./secret_field.js";
 import { stuckIn } from "./words.js";
 
 const COMMON = { enabled: true, types: [], zones: [], tags: [] };
@@ -31,32 +34,38 @@ export class Alerts {
   store = new AlertStore();
 
   /** @param {HTMLDetailsElement} box @param {HTMLDialogElement} dialog @param {import("../data/connection.js").Connection} connection
-   * @param {import("../zones/zones.js").Zones} zones */
-  constructor(box, dialog, connection, zones) {
+   * @param {import("../zones/zones.js").Zones} zones @param {import("../data/changes.js").Changes} changes
+   * @param {import("../page/one_panel.js").Panels} panels */
+  constructor(box, dialog, connection, zones, changes, panels) {
     this.box = box;
     this.zones = zones;
+    this.panels = panels;
     this.confirm = (/** @type {string} */ question, /** @type {string} */ action) => confirmed(dialog, question, action);
     const { store } = this;
-    this.destinationEditor = new ItemEditor(store.destinations, () => store.states.map(({ destination }) => destination));
-    this.ruleEditor = new ItemEditor(store.rules, () => store.allRules);
-    this.destinations = new DestinationList(this.#part("destinations"), store, { edit: (id) => this.#edit(this.destinationEditor, id), confirm: this.confirm });
-    this.rules = new RuleList(this.#part("rules"), store, () => zones.store.zones, { edit: (id) => this.#edit(this.ruleEditor, id), editZone: (id) => zones.edit(id) });
+    this.destinationEditor = new ItemEditor("destination", store.destinations, () => store.states.map(({ destination }) => destination), changes);
+    this.ruleEditor = new ItemEditor("rule", store.rules, () => store.allRules, changes);
+    this.destinations = new DestinationList(this.#part("destinations"), store, { edit: (id) => panels.open("destination", () => this.destinationEditor.open(id)), confirm: this.confirm, isLeaving: (id) => changes.isLeaving(store.destinations.path(id)) });
+    this.rules = new RuleList(this.#part("rules"), store, () => zones.store.zones, { edit: (id) => panels.open("rule", () => this.ruleEditor.open(id)), editZone: (id) => zones.edit(id) });
+    this.networks = new NetworkList(this.#part("networks"), store);
     this.#addForms();
-    this.#addButtons("new-destination", (type) => this.#begin(this.destinationEditor, NEW_DESTINATIONS[type]));
-    this.#addButtons("new-rule", (type) => this.#begin(this.ruleEditor, NEW_RULES[type]));
+    this.#addPanel("destination", this.destinationEditor, (type) => ({ ...NEW_DESTINATIONS[type], ...(type === "webhook" ? { secret: newSecret() } : {}) }));
+    this.#addPanel("rule", this.ruleEditor, (type) => NEW_RULES[type]);
     for (const part of [store, this.destinationEditor, this.ruleEditor, zones.store]) part.addEventListener("change", () => this.#update());
-    for (const editor of [this.destinationEditor, this.ruleEditor]) editor.addEventListener("saved", () => store.refresh());
+    changes.addEventListener("done", (event) => /^(destinations|event-rules)\//.test(/** @type {CustomEvent} */ (event).detail) && store.refresh());
     connection.addEventListener("status", () => (connection.status === "live" ? store.start() : store.stop()));
   }
 
   #addForms() {
     const { store } = this;
     listLanguages(/** @type {HTMLSelectElement} */ (this.#part("language")));
-    new ItemForm(/** @type {HTMLFormElement} */ (this.#part("destination-form")), this.destinationEditor, {
+    const form = /** @type {HTMLFormElement} */ (this.#part("destination-form"));
+    new ItemForm(form, this.destinationEditor, {
       title: ({ id, type }, isNew) => (isNew ? t(`alerts.new_${type}`) : t("destination.title", { id })),
       mayDelete: () => store.isAdmin,
       ask: () => this.confirm(t("destination.question"), t("destination.delete")),
     });
+    new SecretField(form, this.destinationEditor);
+    this.networks.offerIn(form, this.destinationEditor);
     new ItemForm(/** @type {HTMLFormElement} */ (this.#part("rule-form")), this.ruleEditor, {
       title: ({ type }, isNew) => (isNew ? t("rule.new", { rule: t(`rule.${type}`) }) : t(`rule.${type}`)),
       mayDelete: () => store.isAdmin,
@@ -69,28 +78,24 @@ export class Alerts {
     return /** @type {HTMLElement} */ (this.box.querySelector(`[data-part="${name}"]`));
   }
 
-  /** @param {string} name @param {(type: string) => void} begin */
-  #addButtons(name, begin) {
-    for (const one of /** @type {NodeListOf<HTMLElement>} */ (this.#part(name).querySelectorAll("button"))) {
-      one.addEventListener("click", () => begin(/** @type {string} */ (one.dataset.type)));
+  /** Register a form, and the buttons that begin something new in it. @param {"destination" | "rule"} name @param {ItemEditor} editor
+   * @param {(type: string) => Record<string, any>} fresh */
+  #addPanel(name, editor, fresh) {
+    this.panels.add(name, { isOpen: () => editor.item !== null, isUnsaved: () => editor.isUnsaved, saving: () => editor.saving.now, leave: () => editor.close() });
+    for (const one of /** @type {NodeListOf<HTMLElement>} */ (this.#part(`new-${name}`).querySelectorAll("button"))) {
+      const type = one.dataset.type ?? "";
+      one.addEventListener("click", () => this.#mayMake(type) && this.panels.open(name, () => editor.begin(fresh(type))));
     }
   }
 
-  /** @param {ItemEditor} editor @param {Record<string, any>} item */
-  #begin(editor, item) {
-    this.#other(editor).close();
-    editor.begin(item);
-  }
-
-  /** @param {ItemEditor} editor @param {string} id */
-  #edit(editor, id) {
-    this.#other(editor).close();
-    editor.open(id);
-  }
-
-  /** @param {ItemEditor} editor */
-  #other(editor) {
-    return editor === this.ruleEditor ? this.destinationEditor : this.ruleEditor;
+  /** Return whether the service can have a destination of a type. If not, say what it lacks before anybody fills a form.
+   * @param {string} type */
+  #mayMake(type) {
+    const why = this.store.unavailable[type] ?? "";
+    const lacking = this.#part("lacking");
+    lacking.textContent = begun(said(why, this.store.unavailable_phrases[type]));
+    lacking.hidden = why === "";
+    return why === "";
   }
 
   #update() {
@@ -107,5 +112,6 @@ export class Alerts {
     this.#part("no-destination").hidden = shareToken !== null || store.states.length > 0;
     this.destinations.update();
     this.rules.update();
+    this.networks.update();
   }
 }

@@ -17,7 +17,7 @@ export class DestinationList {
   #letters = new Map();
 
   /** @param {HTMLElement} list @param {import("./alert_store.js").AlertStore} store
-   * @param {{edit: (id: string) => void, confirm: (question: string, action: string) => Promise<boolean>}} act */
+   * @param {{edit: (id: string) => void, confirm: (question: string, action: string) => Promise<boolean>, isLeaving: (id: string) => boolean}} act */
   constructor(list, store, act) {
     this.list = list;
     this.store = store;
@@ -28,7 +28,7 @@ export class DestinationList {
     const { states, isAdmin } = this.store;
     keepLines(this.list, states.map((state) => {
       const { id } = state.destination;
-      const key = JSON.stringify([state, isAdmin, this.#answers.get(id), this.#letters.get(id)]);
+      const key = JSON.stringify([state, isAdmin, this.act.isLeaving(id), this.#answers.get(id), this.#letters.get(id)]);
       return { key, make: () => this.#line(state) };
     }));
   }
@@ -42,7 +42,8 @@ export class DestinationList {
     words.classList.toggle("failing", dead > 0 || problem !== null);
     line.append(element("strong", id), element("span", whereTo(destination)), words);
     if (problem !== null) line.append(element("p", t("queue.problem", { problem }), "failing"));
-    if (this.store.isAdmin) line.append(this.#actions(id, dead));
+    if (this.act.isLeaving(id)) line.append(element("p", t("destination.leaving"), "answer"));
+    else if (this.store.isAdmin) line.append(this.#actions(id, dead));
     const answer = this.#answers.get(id);
     if (answer !== undefined) line.append(element("p", answer, "answer"));
     const letters = this.#letters.get(id);
@@ -113,7 +114,7 @@ export class DestinationList {
     try {
       await act();
     } catch (error) {
-      this.#answer(id, refusal(error instanceof Error ? error.message : String(error)));
+      this.#answer(id, refusal(error));
     }
   }
 

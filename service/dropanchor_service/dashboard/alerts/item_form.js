@@ -19,6 +19,7 @@ export class ItemForm {
       editor.save(this.#values(), this.#named());
     });
     form.addEventListener("reset", () => editor.close());
+    form.addEventListener("input", () => (editor.isUnsaved = true));
     this.#part("newer").addEventListener("click", () => editor.item && editor.open(editor.item.id));
     this.#part("delete").addEventListener("click", async () => (await act.ask()) && editor.remove());
     editor.addEventListener("change", () => this.#update());

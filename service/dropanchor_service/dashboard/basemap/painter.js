@@ -78,7 +78,7 @@ export class Painter {
     const { drawn, requested } = standIns(wanted, (tile) => this.tiles.find(tile), description.min_zoom, isVector);
     this.tiles.want(requested);
     const [width, height] = [right - left, top - bottom].map((side) => Math.ceil(side * scale * ratio));
-    const colours = Object.fromEntries(Object.entries(palette).filter(([name]) => name === "map" || name.startsWith("base-")));
+    const colours = /** @type {Record<string, string>} */ (Object.fromEntries(Object.entries(palette).filter(([name]) => name === "map" || name.startsWith("base-"))));
     const tiles = drawn.map((tile) => ({ tile, key: keyOf(tile) }));
     const begun = performance.now();
     this.#isPainting = true;

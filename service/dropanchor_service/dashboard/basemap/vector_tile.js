@@ -22,7 +22,7 @@ export function* featuresOf(tile) {
 /** @param {Uint8Array} content @returns {Generator<Feature>} */
 function* featuresOfLayer(content) {
   const features = [];
-  const [/** @type {string[]} */ keys, /** @type {string[]} */ values] = [[], []];
+  const [keys, values] = /** @type {[string[], string[]]} */ ([[], []]);
   let [layer, extent] = ["", DEFAULT_EXTENT];
   for (const [number, value] of fieldsOf(content)) {
     if (number === 1) layer = decoder.decode(bytesIn(value));
@@ -36,7 +36,7 @@ function* featuresOfLayer(content) {
 
 /** @param {Uint8Array} content @param {string[]} keys @param {string[]} values */
 function featureIn(content, keys, values) {
-  let [type, kind, geometry] = [0, "", new Uint8Array()];
+  let [type, kind, geometry] = /** @type {[number, string, Uint8Array]} */ ([0, "", new Uint8Array()]);
   for (const [number, value] of fieldsOf(content)) {
     if (number === 2) kind = kindIn(bytesIn(value), keys, values);
     else if (number === 3) type = Number(value);

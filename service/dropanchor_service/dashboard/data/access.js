@@ -10,8 +10,17 @@ export class KeyRequiredError extends Error {}
 /** The service cannot do this as it is. */
 export class RefusedError extends Error {}
 
-/** The service answers, but is still starting. The message says what it does. */
-export class StartingError extends Error {}
+/** The service refuses something, and says why. */
+export class ProblemError extends Error {
+  /** @param {import("../i18n/said.js").Problem} problem */
+  constructor(problem) {
+    super(problem.detail);
+    this.problem = problem;
+  }
+}
+
+/** The service answers, but is still starting. The problem says what it does. */
+export class StartingError extends ProblemError {}
 
 const CONFLICT = 409;
 const UNAVAILABLE = 503;
@@ -36,19 +45,29 @@ export async function request(url, options) {
   if (response.status === 401 || response.status === 403) throw new KeyRequiredError(`${url.pathname} requires another key`);
   if (response.status === UNAVAILABLE) {
     const problem = await response.json();
-    if (problem.type === NOT_READY) throw new StartingError(problem.detail);
+    if (problem.type === NOT_READY) throw new StartingError(problem);
   }
   if (response.status === CONFLICT) throw new RefusedError(`${url.pathname} is refused`);
   if (!response.ok) throw new Error(`${url.pathname} returned status ${response.status}`);
   return response;
 }
 
+/** The service does not answer. */
+export class UnreachableError extends Error {}
+
 /** Somebody changed the resource since this page has read it. */
-export class ChangedMeanwhileError extends Error {}
+export class ChangedMeanwhileError extends ProblemError {}
+
+/** A receiver lies inside, in a network that an administrator can allow. */
+export class NetworkRefusedError extends ProblemError {
+  get network() {
+    return /** @type {string} */ (this.problem.network);
+  }
+}
 
 /**
  * Send a change. Return the ETag of the new resource, empty after a deletion. Throws ChangedMeanwhileError when the
- * conditions are not met, and Error with the sentence of the service when it refuses the change.
+ * conditions are not met, and ProblemError when the service refuses the change.
  * @param {URL} url @param {"PUT" | "DELETE"} method @param {object | null} body
  * @param {Record<string, string>} conditions headers
  */
@@ -62,37 +81,38 @@ export async function send(url, method, body, conditions = {}) {
   const headers = { ...authorization(), ...conditions, "content-type": "application/json" };
   const response = await answerTo(url, { method, headers, body: body && JSON.stringify(body) });
   if (response.ok) return response;
-  const { detail } = await response.json();
-  throw response.status === CHANGED_MEANWHILE ? new ChangedMeanwhileError(detail) : new Error(detail);
+  const problem = await response.json();
+  if (problem.network) throw new NetworkRefusedError(problem);
+  throw response.status === CHANGED_MEANWHILE ? new ChangedMeanwhileError(problem) : new ProblemError(problem);
 }
 
-/** Send a file. Return the answer. Throws Error with the sentence of the service when it refuses the file.
+/** Send a file. Return the answer. Throws ProblemError when the service refuses the file.
  * @param {URL} url @param {File} file @returns {Promise<any>} */
 export async function upload(url, file) {
   const headers = { ...authorization(), "content-type": file.type || "application/octet-stream" };
   const response = await answerTo(url, { method: "POST", headers, body: file });
   const answer = await response.json();
-  if (!response.ok) throw new Error(answer.detail);
+  if (!response.ok) throw new ProblemError(answer);
   return answer;
 }
 
 /**
- * Ask for an action that has no body. Return the response. Throws Error with the sentence of the service when it refuses.
- * @param {URL} url @param {"POST" | "DELETE"} method
+ * Ask for an action that has no body. Return the response. Throws ProblemError when the service refuses.
+ * @param {URL} url @param {"POST" | "PUT" | "DELETE"} method
  */
 export async function requestChange(url, method) {
   const response = await answerTo(url, { method, headers: authorization() });
   if (response.ok) return response;
-  throw new Error((await response.json()).detail);
+  throw new ProblemError(await response.json());
 }
 
-/** Return the response to a change. Throws Error with a sentence like those of the service when it does not answer.
+/** Return the response to a change. Throws UnreachableError when the service does not answer. A deletion goes on when the page is closed meanwhile.
  * @param {URL} url @param {RequestInit} options */
 async function answerTo(url, options) {
   try {
-    return await fetch(url, { ...options, cache: "no-store" });
+    return await fetch(url, { ...options, cache: "no-store", keepalive: options.method === "DELETE" });
   } catch {
-    throw new Error("The service cannot be reached.");
+    throw new UnreachableError("The service cannot be reached.");
   }
 }
 

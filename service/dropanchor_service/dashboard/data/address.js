@@ -1,9 +1,30 @@
 /** The values in the address of the page: those after `#`, which no server sees, and before them those after `?`. */
 
+/** The hash that the page read or wrote last. A link that a person follows changes the hash before the page hears of it. */
+let known = "";
+
+export const isAddressRead = () => location.hash === known;
+
 /** Return the values; of two with one name the one after `#` comes last. */
 export function addressValues() {
   const { search = "", hash = "" } = globalThis.location ?? {};
+  known = hash;
   return new URLSearchParams([...new URLSearchParams(search), ...new URLSearchParams(hash.slice(1))]);
+}
+
+/** Return the names in a list of the address. @param {string} text */
+export const listIn = (text) => text.split(",").filter((name) => name !== "").map(unescaped);
+
+/** Return names as a list for the address. A comma in a name stays part of it. @param {readonly string[]} names */
+export const listText = (names) => names.map((name) => encodeURIComponent(name)).join(",");
+
+/** @param {string} name */
+function unescaped(name) {
+  try {
+    return decodeURIComponent(name);
+  } catch {
+    return name; // typed by hand
+  }
 }
 
 /** Return the hash with other values; null removes one. @param {string} hash @param {Record<string, string | null>} values */
@@ -19,6 +40,7 @@ export function hashWith(hash, values) {
 
 /** Write values after the `#`, without a new entry in the history of the browser. @param {Record<string, string | null>} values */
 export function writeAddress(values) {
-  const hash = hashWith(location.hash, values);
+  const [hash, isRead] = [hashWith(location.hash, values), isAddressRead()];
   if (hash !== location.hash) history.replaceState(null, "", hash || location.pathname + location.search);
+  if (isRead) known = location.hash;
 }

@@ -1,24 +1,30 @@
-/** Change anchors and tags: only what this page has seen, and undo the last changes. */
+/** Change what the service holds: only what this page has seen, and so that it can be undone. */
 
-import { ChangedMeanwhileError, KeyRequiredError, request, sendChange } from "./access.js";
+import { ChangedMeanwhileError, KeyRequiredError, request, sendChange, UnreachableError } from "./access.js";
 import { api, getJson } from "./connection.js";
+import { UNDO_MS, UndoStack } from "./undo.js";
 import { t } from "../i18n/language.js";
 import { refusal } from "../i18n/said.js";
 
 /** @typedef {{value: any, etag: string}} Seen a resource as this page has read it */
-/** @typedef {{what: string, path: string, body: object | null, conditions: Record<string, string>}} Undo */
+/** @typedef {Partial<import("./undo.js").Step>} More of the step that undoes a change */
 /** @typedef {{what: string, keep: () => void, take: () => void}} Conflict */
 
-const UNDO_STEPS = 20;
 const RETRY_MS = 3000;
 
-/** Events: "done" (detail: what), "failed" (detail: a sentence), "conflict" (detail: Conflict), "access". */
+/** Events: "done" (detail: the path of what was changed), "failed" (detail: a sentence), "conflict" (detail: Conflict), "access". */
 export class Changes extends EventTarget {
-  /** @type {Undo[]} */
-  #undo = [];
+  history = new UndoStack();
+  /** The deletions that wait until nobody can undo them any longer: what sends each, by its path. @type {Map<string, () => void>} */
+  #leaving = new Map();
   /** @type {"none" | "read" | "write" | "admin"} */
   #scope = "none";
   #retry = 0;
+
+  constructor() {
+    super();
+    globalThis.addEventListener?.("pagehide", () => [...this.#leaving.values()].forEach((send) => send()));
+  }
 
   get mayWrite() {
     return this.#scope === "write" || this.#scope === "admin";
@@ -26,12 +32,6 @@ export class Changes extends EventTarget {
 
   get mayDelete() {
     return this.#scope === "admin";
-  }
-
-  /** Whether this page may undo its last change. */
-  get canUndo() {
-    const last = this.#undo.at(-1);
-    return last !== undefined && (last.body !== null || this.mayDelete);
   }
 
   /** Request what the key of this page allows, until the service answers. */
@@ -48,63 +48,106 @@ export class Changes extends EventTarget {
 
   /** @param {string} path @returns {Promise<Seen>} */
   async read(path) {
-    const response = await request(api(path), {});
+    const response = await request(api(path), {}).catch((error) => {
+      throw error instanceof TypeError ? new UnreachableError("The service cannot be reached.") : error;
+    });
     return { value: await response.json(), etag: response.headers.get("etag") ?? "" };
   }
 
   /** Create a resource that must not exist yet. @param {string} what done, as a sentence @param {string} path @param {object} value */
-  async create(what, path, value) {
-    return this.#attempt(what, async () => {
-      const etag = await sendChange(api(path), "PUT", value, { "if-none-match": "*" });
-      return { path, body: null, conditions: { "if-match": etag } };
-    });
+  create(what, path, value) {
+    return this.#attempt(what, () => this.apply(what, path, { value: null, etag: "" }, value));
   }
 
   /**
    * Change some values of a resource, unless another page has changed it: then ask what to do.
    * @param {string} what @param {string} path @param {object} patch @param {Seen} seen
-   * @param {() => void} reread reads the resource again, after a conflict
+   * @param {() => void} reread reads the resource again, after a conflict @param {More} [more]
    * @returns {Promise<boolean>} whether the change was made
    */
-  async edit(what, path, patch, seen, reread) {
+  edit(what, path, patch, seen, reread, more) {
     const keep = async () => {
-      if (await this.edit(what, path, patch, await this.read(path), reread)) reread();
+      if (await this.edit(what, path, patch, await this.read(path), reread, more)) reread();
     };
-    return this.#attempt(what, async () => {
-      const etag = await sendChange(api(path), "PUT", { ...seen.value, ...patch }, { "if-match": seen.etag });
-      return { path, body: seen.value, conditions: { "if-match": etag } };
-    }, { keep, take: reread });
+    return this.#attempt(what, () => this.apply(what, path, seen, { ...seen.value, ...patch }, more), { keep, take: reread });
   }
 
-  /**
-   * Delete a resource. @param {string} what @param {string} path
-   * @param {{path: string, value: object, conditions: Record<string, string>}} restore what brings it back
-   */
-  async remove(what, path, restore) {
+  /** Change some values of a resource as it is now. @param {string} what @param {string} path @param {object} patch @param {More} [more] */
+  editAsIs(what, path, patch, more) {
     return this.#attempt(what, async () => {
-      await sendChange(api(path), "DELETE", null, {});
-      return { path: restore.path, body: restore.value, conditions: restore.conditions };
+      const seen = await this.read(path);
+      await this.apply(what, path, seen, { ...seen.value, ...patch }, more);
     });
   }
 
-  /** Undo the last change, unless somebody has changed the same resource since. */
-  async undo() {
-    if (!this.canUndo) return;
-    const { what, path, body, conditions } = /** @type {Undo} */ (this.#undo.pop());
-    try {
-      await sendChange(api(path), body === null ? "DELETE" : "PUT", body, conditions);
-      this.#tell("done", t("outcome.undone", { what }));
-    } catch (error) {
-      const changed = error instanceof ChangedMeanwhileError;
-      this.#tell("failed", changed ? t("outcome.not_undone", { what }) : sentence(error));
-    }
+  /** Delete a resource as it is now. @param {string} what @param {string} path */
+  remove(what, path) {
+    return this.#attempt(what, async () => this.apply(what, path, await this.read(path), null));
   }
 
-  /** @param {string} what @param {() => Promise<Omit<Undo, "what">>} send @param {Omit<Conflict, "what">} [conflict] */
+  /**
+   * Bring a resource into another state, and keep how to undo that. Throws as `sendChange` does.
+   * @param {string} what @param {string} path @param {Seen} seen value null: it must not exist yet
+   * @param {object | null} value null: delete it @param {More} [more]
+   */
+  async apply(what, path, seen, value, more = {}) {
+    const back = await this.#swap(path, seen.value, value, seen.etag);
+    const isFinal = seen.value === null && !this.mayDelete;
+    this.history.push({ what, path, back, ...(isFinal ? { refusal: t("outcome.needs_admin") } : {}), ...more });
+  }
+
+  /** Delete a resource that nobody could bring back, once the time to undo that is over. @param {string} what @param {string} path
+   * @param {string} etag @param {string} note what is true until then */
+  removeLater(what, path, etag, note) {
+    const owner = {};
+    let timer = 0;
+    const send = async () => {
+      clearTimeout(timer);
+      this.history.forget(owner);
+      try {
+        await this.#swap(path, null, null, etag);
+      } catch (error) {
+        if (error instanceof UnreachableError) return void (timer = setTimeout(send, RETRY_MS));
+        this.#tell("failed", sentence(error));
+      }
+      return void this.#leaving.delete(path);
+    };
+    const wait = () => {
+      timer = setTimeout(send, UNDO_MS);
+      this.#leaving.set(path, send);
+      this.#tell("done", path);
+      return stay;
+    };
+    const stay = () => {
+      clearTimeout(timer);
+      this.#leaving.delete(path);
+      this.#tell("done", path);
+      return wait;
+    };
+    this.history.push({ what, path, owner, note, back: wait() });
+  }
+
+  /** Return whether a resource is about to be deleted. @param {string} path */
+  isLeaving(path) {
+    return this.#leaving.has(path);
+  }
+
+  /** Return what takes the change back. @param {string} path @param {object | null} before @param {object | null} after
+   * @param {string} etag of what there is before; empty: nothing @returns {Promise<import("./undo.js").Back>} */
+  async #swap(path, before, after, etag) {
+    /** @type {Record<string, string>} */
+    const conditions = etag === "" ? { "if-none-match": "*" } : { "if-match": etag };
+    const left = after === null
+      ? await sendChange(api(deletedAt(path)), "DELETE", null, conditions)
+      : await sendChange(api(path), "PUT", after, conditions);
+    this.#tell("done", path);
+    return () => this.#swap(path, after, before, left);
+  }
+
+  /** @param {string} what @param {() => Promise<unknown>} send @param {Omit<Conflict, "what">} [conflict] */
   async #attempt(what, send, conflict) {
     try {
-      this.#undo = [...this.#undo, { what, ...(await send()) }].slice(-UNDO_STEPS);
-      this.#tell("done", what);
+      await send();
       return true;
     } catch (error) {
       if (error instanceof ChangedMeanwhileError && conflict) this.#tell("conflict", { what, ...conflict });
@@ -119,5 +162,8 @@ export class Changes extends EventTarget {
   }
 }
 
-/** @param {unknown} error */
-const sentence = (error) => refusal(error instanceof Error ? error.message : String(error));
+/** A tag is deleted together with its settings. @param {string} path */
+const deletedAt = (path) => path.replace(/^(tags\/[^/]+)\/settings$/, "$1");
+
+/** Return the sentence of the service in the language of the page. @param {unknown} error */
+export const sentence = (error) => refusal(error);

@@ -3,6 +3,7 @@
 import { request, KeyRequiredError, StartingError } from "./access.js";
 import { EpochFence } from "./epochs.js";
 import { eventsOf } from "./events.js";
+import { said } from "../i18n/said.js";
 
 /** Frames per second; fewer for a large fleet, whose frames are large. */
 const HZ = 10;
@@ -40,7 +41,7 @@ export class Connection extends EventTarget {
   /** "locked": the service requires a key, or another one. "starting": it answers, but is not ready yet.
    * @type {"connecting" | "starting" | "live" | "lost" | "locked"} */
   status = "connecting";
-  /** What the service does while it is starting. */
+  /** What the service does while it is starting, in the language of the page. */
   progress = "";
   /** performance.now() at which the connection was lost. */
   lostAt = NaN;
@@ -117,7 +118,7 @@ export class Connection extends EventTarget {
     this.#stream.abort();
     clearTimeout(this.#timer);
     if (why instanceof StartingError) {
-      this.progress = why.message;
+      this.progress = said(why.message, why.problem.detail_phrase);
       this.#become("starting");
       this.#timer = setTimeout(() => this.#open(), STARTING_MS);
       return;

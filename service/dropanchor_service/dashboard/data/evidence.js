@@ -22,7 +22,9 @@ const RECENT_S = 5;
  * @property {any} pose
  * @property {{range_rate_mps: number | null}} speed
  * @property {{t_ns: number[], speed_mps: (number | null)[]}} speed_track
+ * @property {{t_ns: number[], z: (number | null)[], z_std_m: (number | null)[]}} height_track
  * @property {Innovation[]} innovations oldest first
+ * @property {{white_m: number, lasting_m: number} | null} range_errors
  * @property {number} refused
  * @property {Record<string, number>} samples
  * @property {Record<string, number>} rejected

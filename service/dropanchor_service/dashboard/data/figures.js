@@ -26,6 +26,7 @@ export const FIGURES = ["tracked_s", "distance_m", "mean_speed_mps", "max_speed_
 /** @param {Wanted} wanted @param {string} format */
 export function urlOf({ from_ms, to_ms, group }, format) {
   const url = api("figures");
+  /** @type {Record<string, string>} */
   const which = group !== "" ? { group } : {};
   url.search = new URLSearchParams({ from: nanoseconds(from_ms), to: nanoseconds(to_ms), format, ...which }).toString();
   return url;

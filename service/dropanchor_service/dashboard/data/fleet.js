@@ -4,12 +4,12 @@ import { OUT_OF_DATE, STATES, staleness, stateIn } from "./states.js";
 
 /** Columns of numbers; unknown is NaN. Names as in the stream. */
 const NUMBERS = /** @type {const} */ ([
-  "x", "y", "heading_rad", "speed_mps", "yaw_rate_radps", "sigma_pos_m", "sigma_obs_m", "p_mode", "range_m",
+  "x", "y", "z", "z_std_m", "floor_probability", "heading_rad", "speed_mps", "yaw_rate_radps", "sigma_pos_m", "sigma_obs_m", "p_mode", "range_m",
   "semi_major_m", "semi_minor_m", "angle_rad",
 ]);
 
 /** Columns of values that are stored as received; unknown is null. */
-const VALUES = /** @type {const} */ (["reason", "hint", "frame", "anchor", "hypotheses"]);
+const VALUES = /** @type {const} */ (["reason", "hint", "hint_phrase", "frame", "anchor", "hypotheses", "z_source", "floor"]);
 
 /**
  * @typedef {object} Hypothesis
@@ -64,8 +64,8 @@ export class Fleet {
   ownY = new Float32Array(0);
   /** @type {Record<typeof NUMBERS[number], Float32Array>} */
   number = /** @type {any} */ (Object.fromEntries(NUMBERS.map((name) => [name, new Float32Array(0)])));
-  /** @type {{reason: (string|null)[], hint: (string|null)[], frame: (string|null)[], anchor: (string|null)[], hypotheses: (Hypothesis[]|null)[]}} */
-  value = { reason: [], hint: [], frame: [], anchor: [], hypotheses: [] };
+  /** @type {{reason: (string|null)[], hint: (string|null)[], hint_phrase: (import("../i18n/said.js").Phrase|null)[], frame: (string|null)[], anchor: (string|null)[], z_source: (string|null)[], floor: (string|null)[], hypotheses: (Hypothesis[]|null)[]}} */
+  value = { reason: [], hint: [], hint_phrase: [], frame: [], anchor: [], z_source: [], floor: [], hypotheses: [] };
 
   /** @param {string | null} name @returns {number} −1: no such tag */
   row(name) {

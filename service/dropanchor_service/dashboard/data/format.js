@@ -32,8 +32,8 @@ export function coordinate(value_m) {
 /** Format a length with its unit. @param {number | null | undefined} value_m @param {number} [decimals] */
 export const length = (value_m, decimals = 2) => (known(value_m) ? `${fixed(inUnit(value_m), decimals)} ${units.length.symbol}` : UNKNOWN);
 
-/** Format a standard deviation, with fewer decimals the larger it is. @param {number | null | undefined} value_m */
-export function sigma(value_m) {
+/** Format half a width, with fewer decimals the larger it is. @param {number | null | undefined} value_m */
+export function half(value_m) {
   const value = inUnit(value_m);
   return fixed(value, value < 10 ? 2 : value < 100 ? 1 : 0);
 }
@@ -106,11 +106,30 @@ export const place3 = (x, y, z) => t("place3", {
   x: fixed(inUnit(x), 2), y: fixed(inUnit(y), 2), z: fixed(inUnit(z), 2), unit: units.length.symbol,
 });
 
-/** Format a standard deviation with its unit. @param {number} value_m */
-export const sigmaText = (value_m) => `± ${sigma(value_m)} ${units.length.symbol}`;
+/** Format how far a tag may be from its dot, along and across its ellipse. @param {number} major_m semi-axis @param {number} minor_m semi-axis */
+export function accuracy(major_m, minor_m) {
+  if (!known(major_m) || !known(minor_m)) return UNKNOWN;
+  const { symbol } = units.length;
+  return t("figure.along_across", { along: `${half(major_m)} ${symbol}`, across: `${half(minor_m)} ${symbol}` });
+}
 
-/** Format the semi-axes of an ellipse. @param {number} major_m @param {number} minor_m */
-export const ellipse = (major_m, minor_m) => `${fixed(inUnit(major_m), 2)} × ${length(minor_m)}`;
+/**
+ * Format a height with its standard deviation and where it comes from.
+ *
+ * @param {number | null | undefined} z_m
+ * @param {number | null | undefined} std_m
+ * @param {string | null | undefined} source as `z_source` in the stream
+ */
+export function height(z_m, std_m, source) {
+  if (!known(z_m) || !known(std_m) || !source) return UNKNOWN;
+  if (source === "unknown") return t("figure.height_unknown");
+  if (source === "told") return t("figure.height_told", { height: length(z_m) });
+  return t("figure.height_pressure", { height: length(z_m), error: length(std_m) });
+}
+
+/** Format a floor with its probability; empty without one.
+ * @param {string | null | undefined} name @param {number | null | undefined} probability */
+export const floor = (name, probability) => (name ? t("figure.floor_probability", { floor: name, probability: percent(probability) }) : "");
 
 /** Format a number of tags. @param {number} n */
 export const tagCount = (n) => t("count.tags", { n });

@@ -1,6 +1,6 @@
-/** Named items of the interface, such as zones and rules: read, saved and deleted with ETags. */
+/** Named items of the interface, such as zones and rules: where they are, and reading one with its ETag. */
 
-import { request, sendChange } from "./access.js";
+import { request } from "./access.js";
 import { api } from "./connection.js";
 
 /** @typedef {Record<string, any> & {id: string}} Item as in the interface */
@@ -12,24 +12,19 @@ export class Items {
     this.itemOf = itemOf;
   }
 
+  /** @param {string} id */
+  path(id) {
+    return `${this.collection}/${encodeURIComponent(id)}`;
+  }
+
   /** @param {string} id @param {string} [rest] of the path */
   url(id, rest = "") {
-    return api(`${this.collection}/${encodeURIComponent(id)}${rest}`);
+    return api(this.path(id) + rest);
   }
 
-  /** @param {string} id @returns {Promise<{item: Item, etag: string}>} */
+  /** @param {string} id @returns {Promise<import("./changes.js").Seen>} */
   async read(id) {
     const response = await request(this.url(id), {});
-    return { item: this.itemOf(await response.json()), etag: response.headers.get("etag") ?? "" };
-  }
-
-  /** Save an item. Throws as sendChange does. @param {Item} item @param {string | null} etag of the present one; null: it is new */
-  save(item, etag) {
-    return sendChange(this.url(item.id), "PUT", item, etag === null ? { "if-none-match": "*" } : { "if-match": etag });
-  }
-
-  /** Delete an item. Throws as sendChange does. @param {string} id @param {string} etag */
-  remove(id, etag) {
-    return sendChange(this.url(id), "DELETE", null, { "if-match": etag });
+    return { value: this.itemOf(await response.json()), etag: response.headers.get("etag") ?? "" };
   }
 }

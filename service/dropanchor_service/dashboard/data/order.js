@@ -50,13 +50,13 @@ function compare(a, b, sign) {
 
 /** @param {Fleet} fleet @param {string} column @param {number} now_ms @returns {((row: number) => number) | null} */
 function valueOf(fleet, column, now_ms) {
-  const { x, y, sigma_pos_m: sigma, speed_mps: speed } = fleet.number;
+  const { x, y, semi_major_m: half, speed_mps: speed } = fleet.number;
   /** @type {Record<string, (row: number) => number>} */
   const values = {
     state: (row) => RANK_OF[fleet.state[row]],
     x: (row) => x[row],
     y: (row) => y[row],
-    sigma: (row) => sigma[row],
+    accuracy: (row) => half[row],
     speed: (row) => speed[row],
     age: (row) => fleet.age(row, now_ms),
     online: (row) => 1 - fleet.online[row],

@@ -7,6 +7,11 @@
  * @property {string[]} frame
  * @property {(number | null)[]} x
  * @property {(number | null)[]} y
+ * @property {(number | null)[]} z
+ * @property {(number | null)[]} z_std_m
+ * @property {(string | null)[]} z_source
+ * @property {(string | null)[]} floor
+ * @property {(number | null)[]} floor_probability
  * @property {(number | null)[]} heading_rad
  * @property {(number | null)[]} speed_mps
  * @property {(number | null)[]} sigma_pos_m
@@ -28,8 +33,12 @@
  * @property {string[]} tags
  * @property {Int32Array} starts of each tag's points, and the end
  * @property {string[]} states that `state` counts
+ * @property {string[]} sources of heights that `source` counts; empty: none
+ * @property {string[]} floors that `floor` counts; empty: none
  * @property {Float64Array} time ms
  * @property {Uint8Array} state
+ * @property {Uint8Array} source of the height
+ * @property {Uint8Array} floor
  * @property {Uint8Array} turned 1: in a frame of the tag's own
  * @property {Uint8Array} since what is known since the previous point: TRACKING, DOUBTFUL or UNKNOWN
  * @property {Record<typeof NUMBERS[number], Float32Array>} number
@@ -37,7 +46,7 @@
  */
 
 export const NUMBERS = /** @type {const} */ ([
-  "x", "y", "heading_rad", "speed_mps", "sigma_pos_m", "semi_major_m", "semi_minor_m", "angle_rad",
+  "x", "y", "z", "z_std_m", "floor_probability", "heading_rad", "speed_mps", "sigma_pos_m", "semi_major_m", "semi_minor_m", "angle_rad",
 ]);
 export const FIGURES = /** @type {const} */ (["poses", "tracked_s", "distance_m", "mean_speed_mps", "max_speed_mps"]);
 export const TRACKING = 0;
@@ -51,8 +60,8 @@ export function packed(tracks) {
   tracks.forEach(({ points }, i) => (starts[i + 1] = starts[i] + points.t_ns.length));
   const length = starts[tracks.length];
   const all = {
-    tags: tracks.map(({ tag }) => tag), starts, states: /** @type {string[]} */ ([]), time: new Float64Array(length),
-    state: new Uint8Array(length), turned: new Uint8Array(length), since: new Uint8Array(length),
+    tags: tracks.map(({ tag }) => tag), starts, states: /** @type {string[]} */ ([]), sources: /** @type {string[]} */ ([]), floors: /** @type {string[]} */ ([]), time: new Float64Array(length),
+    state: new Uint8Array(length), source: new Uint8Array(length), floor: new Uint8Array(length), turned: new Uint8Array(length), since: new Uint8Array(length),
     number: /** @type {Packed["number"]} */ (Object.fromEntries(NUMBERS.map((name) => [name, new Float32Array(length)]))),
     figure: /** @type {Packed["figure"]} */ (Object.fromEntries(FIGURES.map((name) => [name, Float64Array.from(tracks, (track) => track[name] ?? NaN)]))),
   };
@@ -62,10 +71,12 @@ export function packed(tracks) {
 
 /** @param {Packed} all @param {Points} points @param {number} start */
 function pack(all, points, start) {
-  const { time, state, turned, since, number } = all;
+  const { time, state, source, floor, turned, since, number } = all;
   for (let i = 0; i < points.t_ns.length; i++) {
     time[start + i] = points.t_ns[i] / 1e6;
     state[start + i] = numberOf(all.states, points.state[i]);
+    source[start + i] = numberOf(all.sources, points.z_source[i] ?? "");
+    floor[start + i] = numberOf(all.floors, points.floor[i] ?? "");
     turned[start + i] = points.frame[i] === "relative" ? 1 : 0;
     since[start + i] = BETWEEN.indexOf(points.since_previous[i]);
   }
@@ -83,5 +94,5 @@ function numberOf(texts, text) {
 }
 
 /** Return what a worker need not copy. @param {Packed} all */
-export const buffersOf = ({ starts, time, state, turned, since, number, figure }) =>
-  [starts, time, state, turned, since, ...Object.values(number), ...Object.values(figure)].map(({ buffer }) => buffer);
+export const buffersOf = ({ starts, time, state, source, floor, turned, since, number, figure }) =>
+  [starts, time, state, source, floor, turned, since, ...Object.values(number), ...Object.values(figure)].map(({ buffer }) => buffer);

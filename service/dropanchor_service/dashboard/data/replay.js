@@ -44,16 +44,18 @@ export class Replay extends EventTarget {
     this.dispatchEvent(new Event("state"));
   }
 
-  /** Show a period from its first moment, or from another. @param {number} from_ms @param {number} to_ms @param {number} [time_ms] */
-  async open(from_ms, to_ms, time_ms = from_ms) {
+  /** Show a period from its first pose, or from another moment. @param {number} from_ms @param {number} to_ms @param {number} [time_ms] */
+  async open(from_ms, to_ms, time_ms) {
     this.close();
     [this.from_ms, this.to_ms, this.playing] = [from_ms, to_ms, false];
-    this.time_ms = Math.min(to_ms, Math.max(from_ms, time_ms));
+    this.time_ms = Math.min(to_ms, Math.max(from_ms, time_ms ?? from_ms));
+    this.loading = true;
     this.dispatchEvent(new Event("period"));
     const found = await this.#request(from_ms, to_ms, 300);
     if (!found) return;
     this.figures = found;
     this.isLoaded = true;
+    if (time_ms === undefined && this.time_ms === from_ms) this.time_ms = Math.max(from_ms, found.first_ms ?? from_ms);
     this.dispatchEvent(new Event("period"));
     await this.seek(this.time_ms);
   }
@@ -153,7 +155,7 @@ export class Replay extends EventTarget {
     } catch {
       if (signal.aborted) return null;
       this.problem = t("past.unreadable");
-      this.playing = false;
+      this.playing = this.loading = false;
       this.dispatchEvent(new Event("state"));
       return null;
     }

@@ -7,7 +7,7 @@ const REQUEST_MS = 3000;
 const REQUEST_MS_PER_TAG = 5;
 
 /** @typedef {{offset_s: number, uncertainty_s: number}} Offset */
-/** @typedef {{reason: string, hint: string, setting: Record<string, string | boolean> | null}} Care */
+/** @typedef {{reason: string, hint: string, hint_phrase: import("../i18n/said.js").Phrase | null, setting: Record<string, string | boolean> | null}} Care */
 
 /**
  * @typedef {object} TagStatus as in the contract, as far as the page needs it
@@ -17,6 +17,7 @@ const REQUEST_MS_PER_TAG = 5;
  * @property {Record<string, number>} rejected by reason
  * @property {number} [lag_s] how late its poses come at most, because it sends its motion in batches
  * @property {string} hint what a person can do so that more samples are used; empty when there is nothing to do
+ * @property {import("../i18n/said.js").Phrase | null} hint_phrase
  * @property {string | null} unknown_anchor an anchor that the tag ranges to although the site does not have it
  * @property {Health | null} health what the tag reports about itself
  * @property {(Offset & {from_motion: Offset | null}) | null} clock_offset of motion, ahead of the ranges

@@ -13,10 +13,10 @@ let requests = 0;
 const waiting = new Map();
 
 /** Return the thinned tracks over a period. @param {number} from_ms @param {number} to_ms @param {number} points of each tag
- * @param {{tag?: string, signal?: AbortSignal}} [options] tag: only this one @returns {Promise<Tracks>} */
-export async function readTracks(from_ms, to_ms, points, { tag, signal } = {}) {
+ * @param {{tags?: readonly string[], signal?: AbortSignal}} [options] tags: only these @returns {Promise<Tracks>} */
+export async function readTracks(from_ms, to_ms, points, { tags, signal } = {}) {
   const signals = [AbortSignal.timeout(TIMEOUT_MS), ...(signal ? [signal] : [])];
-  const response = await request(tracksUrl(from_ms, to_ms, points, tag), { signal: AbortSignal.any(signals) });
+  const response = await request(tracksUrl(from_ms, to_ms, points, tags), { signal: AbortSignal.any(signals) });
   const content = await response.arrayBuffer();
   const number = requests++;
   return new Promise((resolve) => {
@@ -35,11 +35,11 @@ function theWorker() {
   return worker;
 }
 
-/** @param {number} from_ms @param {number} to_ms @param {number} points @param {string} [tag] */
-function tracksUrl(from_ms, to_ms, points, tag) {
+/** @param {number} from_ms @param {number} to_ms @param {number} points @param {readonly string[]} [tags] */
+function tracksUrl(from_ms, to_ms, points, tags) {
   const url = api("tracks");
   url.search = new URLSearchParams([
-    ["from", nanoseconds(from_ms)], ["to", nanoseconds(to_ms)], ["max_points", String(points)], ...(tag === undefined ? [] : onlyTag(tag)),
+    ["from", nanoseconds(from_ms)], ["to", nanoseconds(to_ms)], ["max_points", String(points)], ...(tags ?? []).flatMap(onlyTag),
   ]).toString();
   return url;
 }

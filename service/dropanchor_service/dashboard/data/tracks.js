@@ -21,6 +21,13 @@ export class Tracks {
     return this.all.tags.length;
   }
 
+  /** The time of the first point; null without any. */
+  get first_ms() {
+    let first = Infinity;
+    for (let row = 0; row < this.size; row++) if (this.all.starts[row] < this.all.starts[row + 1]) first = Math.min(first, this.all.time[this.all.starts[row]]);
+    return first === Infinity ? null : first;
+  }
+
   *[Symbol.iterator]() {
     for (let row = 0; row < this.size; row++) yield new Track(this.all, row);
   }
@@ -45,6 +52,8 @@ export class Track {
     this.time = part(all.time);
     this.x = part(all.number.x);
     this.y = part(all.number.y);
+    this.z = part(all.number.z);
+    this.z_std_m = part(all.number.z_std_m);
     /** What is known since the previous point: TRACKING, DOUBTFUL or UNKNOWN. */
     this.since = part(all.since);
     /** Figures over the whole time; NaN: unknown. */
@@ -96,14 +105,21 @@ export function frameAt({ all }, time_ms) {
 /** @param {Packed} all @param {Int32Array} points the last point of each tag @param {Float64Array} shares how far it is to the next, 0 to 1
  * @param {number} time_ms */
 function columnsAt(all, points, shares, time_ms) {
-  const { x, y, heading_rad, speed_mps, sigma_pos_m, semi_major_m, semi_minor_m, angle_rad } = all.number;
+  const { x, y, z, z_std_m, heading_rad, speed_mps, sigma_pos_m, semi_major_m, semi_minor_m, angle_rad } = all.number;
   const to = /** @type {Record<string, Float32Array>} */ (Object.fromEntries(NUMBERS.map((name) => [name, new Float32Array(points.length)])));
-  const [state, frame, age_s] = [new Array(points.length), new Array(points.length), new Float64Array(points.length)];
+  const [state, frame, z_source, floor] = Array.from({ length: 4 }, () => new Array(points.length));
+  const age_s = new Float64Array(points.length);
   for (let at = 0; at < points.length; at++) {
     const [i, share] = [points[at], shares[at]];
     const wider = share > 0 && semi_major_m[i + 1] > semi_major_m[i] ? i + 1 : i;
     to.x[at] = mixed(x, i, share);
     to.y[at] = mixed(y, i, share);
+    to.z[at] = mixed(z, i, share);
+    to.z_std_m[at] = mixedStd(z, z_std_m, i, share);
+    z_source[at] = all.sources[all.source[i]] || null;
+    const likely = share > 0.5 ? i + 1 : i;
+    floor[at] = all.floors[all.floor[likely]] || null;
+    to.floor_probability[at] = all.number.floor_probability[likely] * (all.floor[i] === all.floor[i + 1] ? 1 : Math.max(share, 1 - share));
     to.heading_rad[at] = turned(heading_rad[i], heading_rad[i + 1], share);
     to.speed_mps[at] = mixed(speed_mps, i, share);
     to.sigma_pos_m[at] = sigma_pos_m[wider];
@@ -114,7 +130,7 @@ function columnsAt(all, points, shares, time_ms) {
     frame[at] = all.turned[i] ? "relative" : "site";
     age_s[at] = share > 0 ? 0 : (time_ms - all.time[i]) / 1000;
   }
-  return { ...to, state, frame, age_s, relative_pose: state.map(() => null) };
+  return { ...to, z_source, floor, state, frame, age_s, relative_pose: state.map(() => null) };
 }
 
 /** Return how far a time lies between a point and the next, 0 to 1; 0 if the tag was not known all the way.
@@ -129,6 +145,14 @@ function shareAfter(all, i, end, time_ms) {
 function mixed(values, i, share) {
   const [from, to] = [values[i], values[i + 1]];
   return share > 0 && !Number.isNaN(to) ? from + share * (to - from) : from;
+}
+
+/** Return the standard deviation of a value that changes from one to the next at any time between them.
+ * @param {Float32Array} values @param {Float32Array} stds @param {number} i @param {number} share */
+function mixedStd(values, stds, i, share) {
+  if (!(share > 0) || Number.isNaN(values[i + 1])) return stds[i];
+  const variance = (1 - share) * stds[i] ** 2 + share * stds[i + 1] ** 2;
+  return Math.sqrt(variance + share * (1 - share) * (values[i + 1] - values[i]) ** 2);
 }
 
 /** Return a direction between two, the short way round. @param {number} from @param {number} to @param {number} share */

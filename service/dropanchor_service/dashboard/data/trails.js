@@ -27,6 +27,14 @@ class Trail {
     this.length = Math.min(CAPACITY, this.length + 1);
   }
 
+  /** @param {number} time_ms */
+  dropSince(time_ms) {
+    while (this.lastTime >= time_ms) {
+      this.#next = this.at(this.length - 1);
+      this.length--;
+    }
+  }
+
   /** Return the index of the i-th oldest point in the arrays. @param {number} i */
   at(i) {
     return (this.#next - this.length + i + CAPACITY) % CAPACITY;
@@ -85,6 +93,11 @@ export class Trails {
       trail.add(x[at], y[at], trusted[at] === 1, time[at]);
     }
     this.#trails.set(track.tag, trail);
+  }
+
+  /** Forget where a tag was since a time. @param {string} name @param {number} since_ms */
+  forget(name, since_ms) {
+    this.#trails.get(name)?.dropSince(since_ms);
   }
 
   /** Delete the trails of tags that no longer exist. @param {import("./fleet.js").Fleet} fleet */

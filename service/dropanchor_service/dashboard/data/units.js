@@ -47,8 +47,9 @@ export function installUnits(page) {
 /** Write a measure into a field, unless it shows it already. It keeps the exact value. @param {HTMLInputElement} input
  * @param {number | null} value in SI units; null: unknown */
 export function writeMeasure(input, value) {
-  if (readMeasure(input) === value && (value !== null || input.value === "")) return;
-  input.value = input.dataset.shown = value === null ? "" : typed(value, unitOf(input));
+  const isShown = readMeasure(input) === value && (value !== null || input.value === "");
+  if (!isShown) input.value = value === null ? "" : typed(value, unitOf(input));
+  input.dataset.shown = input.value;
   input.dataset.exact = value === null ? "" : String(value);
 }
 

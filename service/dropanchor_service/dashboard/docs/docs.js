@@ -2,12 +2,20 @@
 
 const root = new URL("..", document.baseURI).href.replace(/\/$/, "");
 
+/** @typedef {(document: object) => unknown} Update */
+
 /** Send what people try to this service, also where a proxy has it below a path. */
 const ofThisService = () => ({
-  statePlugins: { spec: { wrapActions: { updateJsonSpec: (update) => (document) => update({ ...document, servers: [{ url: root }] }) } } },
+  statePlugins: {
+    spec: {
+      wrapActions: {
+        updateJsonSpec: (/** @type {Update} */ update) => (/** @type {object} */ document) => update({ ...document, servers: [{ url: root }] }),
+      },
+    },
+  },
 });
 
-SwaggerUIBundle({
+/** @type {any} */ (globalThis).SwaggerUIBundle({
   url: new URL("../api/v1/openapi.json", document.baseURI).href,
   plugins: [ofThisService],
   dom_id: "#interface",

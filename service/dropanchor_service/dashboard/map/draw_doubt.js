@@ -4,30 +4,59 @@ import { horizontal } from "./geometry.js";
 import { percent } from "../data/format.js";
 import { haloStroke, haloText, traceRing } from "./draw_site.js";
 import { hasGhosts, markerRadius, traceTick } from "./draw_tags.js";
-import { FADE, alike } from "./scene.js";
+import { FADE, alike, heightOf } from "./scene.js";
 import { AMBIGUOUS, STATES } from "../data/states.js";
 import { TRAIL_S } from "../data/trails.js";
 
 /** @typedef {import("./scene.js").Scene} Scene */
 
-const ELLIPSES_UP_TO = 1500;
+export const ELLIPSES_UP_TO = 1500;
 const TRAILS_UP_TO = 300;
+/** Above so many tags, the ellipses and trails of those that are not selected are thin and faint. */
+const QUIET_ABOVE = 30;
+const QUIET_ALPHA = 0.4;
 const RINGS_UP_TO = 12;
 const GHOSTS_UP_TO = 300;
 
+/** @param {Scene} scene */
+const isQuiet = (scene) => scene.rows.length > QUIET_ABOVE;
+
 /** Draw the 95 % ellipses, filled only around a trusted pose. @param {Scene} scene */
 export function drawEllipses(scene) {
-  const { ctx, palette } = scene;
+  const { chosen } = scene;
   if (scene.rows.length > ELLIPSES_UP_TO) return;
   for (const { state, stale, rows } of alike(scene)) {
-    ctx.beginPath();
-    for (const row of rows) if (hasEllipse(scene, row)) traceRowEllipse(scene, row);
-    paintEllipses(ctx, palette, palette.state[state], STATES[state].trusted && stale === 0, FADE[stale]);
+    if (!isQuiet(scene)) drawAlikeEllipses(scene, state, stale, rows, false);
+    else drawAlikeEllipses(scene, state, stale, rows.filter((row) => !chosen.includes(row)), true);
+  }
+  if (!isQuiet(scene)) return;
+  for (const row of chosen) {
+    if (scene.rows.includes(row)) drawAlikeEllipses(scene, scene.fleet.state[row], scene.fleet.staleness(row, scene.now_ms), [row], false);
   }
 }
 
-/** Return whether a tag has an ellipse. One with an unknown position has it only while it is selected. @param {Scene} scene @param {number} row */
-const hasEllipse = ({ fleet, selected }, row) =>
+/** @param {Scene} scene @param {number} state @param {0 | 1 | 2} stale @param {number[]} rows @param {boolean} quiet */
+function drawAlikeEllipses(scene, state, stale, rows, quiet) {
+  const { ctx, palette } = scene;
+  ctx.beginPath();
+  for (const row of rows) if (hasEllipse(scene.fleet, row, scene.selected)) traceRowEllipse(scene, row);
+  const isTrusted = STATES[state].trusted && stale === 0;
+  if (quiet) strokeQuietly(ctx, palette.state[state], isTrusted ? [] : [5, 4]);
+  else paintEllipses(ctx, palette, palette.state[state], isTrusted, FADE[stale]);
+}
+
+/** @param {CanvasRenderingContext2D} ctx @param {string} colour @param {number[]} dash */
+function strokeQuietly(ctx, colour, dash) {
+  [ctx.globalAlpha, ctx.strokeStyle, ctx.lineWidth] = [QUIET_ALPHA, colour, 1];
+  ctx.setLineDash(dash);
+  ctx.stroke();
+  ctx.setLineDash([]);
+  ctx.globalAlpha = 1;
+}
+
+/** Return whether a tag has an ellipse. One with an unknown position has it only while it is selected. @param {import("../data/fleet.js").Fleet} fleet
+ * @param {number} row @param {number} selected */
+export const hasEllipse = (fleet, row, selected) =>
   STATES[fleet.state[row]].placed || (row === selected && !hasGhosts(fleet, row) && !fleet.isTurned(row));
 
 /** @param {CanvasRenderingContext2D} ctx @param {import("./palette.js").Palette} palette @param {string} colour @param {boolean} trusted
@@ -113,7 +142,7 @@ function strokeRangeRing({ ctx, view, palette, fleet, roster, anchors, selected,
   if (!anchor || Number.isNaN(range) || (stale === 2 && row !== selected)) return false;
   const state = fleet.state[row];
   ctx.beginPath();
-  traceRing(ctx, view, anchor.x, anchor.y, horizontal(range, anchor.z - roster.height(fleet.names[row])));
+  traceRing(ctx, view, anchor.x, anchor.y, horizontal(range, anchor.z - heightOf(fleet, roster, row)));
   ctx.globalAlpha = alpha * FADE[stale];
   ctx.strokeStyle = palette.state[state];
   ctx.lineWidth = 1.25;
@@ -127,25 +156,26 @@ function strokeRangeRing({ ctx, view, palette, fleet, roster, anchors, selected,
 /** @param {Scene} scene */
 export function drawTrails(scene) {
   const rows = scene.rows.length <= TRAILS_UP_TO ? [...scene.rows] : [];
-  if (scene.selected >= 0 && !rows.includes(scene.selected)) rows.push(scene.selected);
-  for (const row of rows) drawTrail(scene, row);
+  const quiet = isQuiet(scene);
+  for (const row of new Set([...rows, ...scene.chosen])) drawTrail(scene, row, quiet);
   scene.ctx.globalAlpha = 1;
   scene.ctx.setLineDash([]);
 }
 
 /** Draw a trail in pieces that fade with age, dashed where the pose was not trusted. @param {Scene} scene
- * @param {number} row */
-function drawTrail({ ctx, view, palette, fleet, trails, selected, now_ms }, row) {
+ * @param {number} row @param {boolean} quiet whether those of tags that nobody chose are faint */
+function drawTrail({ ctx, view, palette, fleet, trails, chosen, now_ms }, row, quiet) {
   const trail = trails.of(fleet.names[row]);
   if (!trail || trail.length < 2) return;
+  const isChosen = chosen.includes(row);
   ctx.strokeStyle = palette.state[fleet.state[row]];
-  ctx.lineWidth = row === selected ? 2.25 : 1.5;
+  ctx.lineWidth = isChosen ? 2.25 : quiet ? 1 : 1.5;
   ctx.lineJoin = "round";
   for (let from = 0; from < trail.length - 1; from += 15) {
     const to = Math.min(trail.length - 1, from + 15);
     const share = 1 - (now_ms - trail.time[trail.at(to)]) / (TRAIL_S * 1000);
     if (share <= 0) continue;
-    ctx.globalAlpha = (row === selected ? 0.85 : 0.5) * share;
+    ctx.globalAlpha = (isChosen ? 0.85 : quiet ? QUIET_ALPHA / 2 : 0.5) * share;
     ctx.setLineDash(trail.trusted[trail.at(to)] ? [] : [2, 4]);
     strokePiece(ctx, view, trail, from, to);
   }

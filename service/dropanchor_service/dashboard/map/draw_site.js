@@ -12,6 +12,8 @@ const GRID_PX = 26;
 const RING_PX = 88;
 /** Height of the scale bar with its text, from the lower edge of the map. */
 export const SCALE_BAR_PX = 40;
+/** Half the width of the mark of an anchor. */
+export const ANCHOR_PX = 12;
 
 /** @param {CanvasRenderingContext2D} ctx @param {View} view @param {Palette} palette */
 export function drawGrid(ctx, view, palette) {
@@ -109,9 +111,6 @@ export function haloStroke(ctx, palette, colour, width, dash = [], alpha = 1) {
 
 /** @param {CanvasRenderingContext2D} ctx @param {View} view @param {Palette} palette @param {readonly Anchor[]} anchors */
 export function drawAnchors(ctx, view, palette, anchors) {
-  ctx.font = `600 11px ${palette.font}`;
-  ctx.textAlign = "center";
-  ctx.textBaseline = "top";
   for (const anchor of anchors) {
     const [x, y] = [view.screenX(anchor.x), view.screenY(anchor.y)];
     ctx.beginPath();
@@ -122,9 +121,14 @@ export function drawAnchors(ctx, view, palette, anchors) {
     ctx.strokeStyle = palette.map;
     ctx.stroke();
     traceAnchorSign(ctx, x, y);
-    haloText(ctx, palette, t("map.anchor", { id: anchor.id }), x, y + 15, palette["ink-2"]);
+    const { text, top, font } = anchorLabel(palette, anchor);
+    [ctx.font, ctx.textAlign, ctx.textBaseline] = [font, "center", "top"];
+    haloText(ctx, palette, text, x, y + top, palette["ink-2"]);
   }
 }
+
+/** Return the name below the mark of an anchor, and where it stands. @param {Palette} palette @param {Anchor} anchor */
+export const anchorLabel = (palette, { id }) => ({ text: t("map.anchor", { id }), top: 15, height: 12, font: `600 11px ${palette.font}` });
 
 /** @param {CanvasRenderingContext2D} ctx @param {number} x @param {number} y */
 function traceAnchorSign(ctx, x, y) {

@@ -1,15 +1,12 @@
-/** Draw the dots, heading ticks and names of the tags. */
+/** Draw the dots and heading ticks of the tags. */
 
-import { ago } from "../data/format.js";
-import { SCALE_BAR_PX, haloStroke, haloText } from "./draw_site.js";
-import { shortened } from "../data/names.js";
+import { haloStroke } from "./draw_site.js";
 import { FADE, alike } from "./scene.js";
 import { dashOf, isFilled, traceMarker } from "./shapes.js";
 import { AMBIGUOUS, STATES } from "../data/states.js";
 
 /** @typedef {import("./scene.js").Scene} Scene */
 
-const LABELS_UP_TO = 80;
 const TICK_PX = 9;
 const ELSEWHERE_ALPHA = 0.45;
 const RIM_PX = 3;
@@ -104,74 +101,6 @@ export function traceTick(ctx, x, y, heading, radius) {
   ctx.lineTo(x + length * cos, y + length * sin);
 }
 
-/** Draw names beside the dots where they cover neither dots nor each other; the selected and the hovered tag always
- * get one. Return the boxes of the names. @param {Scene} scene @returns {number[][]} left, top, right, bottom */
-export function drawLabels(scene) {
-  const { ctx, palette } = scene;
-  const first = [scene.selected, scene.hovered].filter((row) => row >= 0);
-  const rest = scene.rows.length <= LABELS_UP_TO ? [...scene.rows].filter((row) => !first.includes(row)) : [];
-  ctx.textAlign = "left";
-  ctx.textBaseline = "middle";
-  /** @type {number[][]} */
-  const taken = scene.rows.length <= LABELS_UP_TO ? [...scene.rows].map((row) => dotBox(scene, row)) : [];
-  const dots = taken.length;
-  for (const row of new Set([...first, ...rest])) {
-    const important = first.includes(row);
-    ctx.font = `${important ? 600 : 400} 12px ${palette.font}`;
-    drawLabel(scene, row, important, taken);
-  }
-  return taken.slice(dots);
-}
-
-/** Return the box that a dot covers. @param {Scene} scene @param {number} row */
-function dotBox({ view, fleet }, row) {
-  const [x, y] = [view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row])];
-  return [x - 7, y - 4, x + 7, y + 4];
-}
-
-/** @param {Scene} scene @param {number} row @param {boolean} important @param {number[][]} taken */
-function drawLabel({ ctx, view, palette, fleet, now_ms }, row, important, taken) {
-  const [x, y] = [view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row])];
-  if (Number.isNaN(x + y)) return;
-  const free = freeBox(view);
-  const widthOf = (/** @type {string} */ text) => ctx.measureText(text).width;
-  const { name, note } = labelOf(fleet, row, now_ms);
-  const text = shortened(name, free[2] - free[0] - widthOf(note), widthOf) + note;
-  const width = widthOf(text);
-  const places = [[x + 13, y - 12], [x + 13, y + 13], [x - 13 - width, y - 12], [x - 13 - width, y + 13]];
-  const boxes = places.map(([left, middle]) => [left, middle - 8, left + width, middle + 8]);
-  const box = boxes.find((one) => inside(one, free) && !taken.some((other) => overlap(one, other)))
-    ?? (important && inside([x, y, x, y], [0, 0, view.width, view.height]) ? movedInto(boxes[0], free) : null);
-  if (!box) return;
-  taken.push(box);
-  haloText(ctx, palette, text, box[0], box[1] + 8, important ? palette.ink : palette["ink-2"]);
-}
-
-/** Return the name, and a note about the age or the ambiguity of the pose. @param {import("../data/fleet.js").Fleet} fleet
- * @param {number} row @param {number} now_ms @returns {{name: string, note: string}} */
-function labelOf(fleet, row, now_ms) {
-  const name = fleet.labels[row];
-  if (fleet.staleness(row, now_ms)) return { name, note: ` · ${ago(fleet.age(row, now_ms))}` };
-  return { name, note: fleet.state[row] === AMBIGUOUS ? " ?" : "" };
-}
-
-/** Return the part of the map that neither the buttons nor the scale bar cover. @param {import("./view.js").View} view */
-const freeBox = ({ width, height, covered }) => [4, 4, width - covered - 4, height - SCALE_BAR_PX];
-
-/** @param {number[]} box @param {number[]} free */
-const inside = (box, free) => box[0] >= free[0] && box[1] >= free[1] && box[2] <= free[2] && box[3] <= free[3];
-
-/** @param {number[]} box @param {number[]} free */
-function movedInto(box, free) {
-  const [width, height] = [box[2] - box[0], box[3] - box[1]];
-  const left = Math.max(free[0], Math.min(box[0], free[2] - width));
-  const top = Math.max(free[1], Math.min(box[1], free[3] - height));
-  return [left, top, left + width, top + height];
-}
-
-/** @param {number[]} a @param {number[]} b left, top, right, bottom */
-const overlap = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
-
 /** Draw a ring in the colour that an operator has given to a tag. The dot keeps the colour of its state. @param {Scene} scene */
 export function drawColours({ ctx, view, fleet, rows }) {
   ctx.lineWidth = 2.5;
@@ -185,9 +114,9 @@ export function drawColours({ ctx, view, fleet, rows }) {
 }
 
 /** @param {Scene} scene */
-export function drawSelection({ ctx, view, palette, fleet, selected, hovered, rows }) {
+export function drawSelection({ ctx, view, palette, fleet, chosen, hovered, rows }) {
   const radius = markerRadius(rows.length);
-  for (const [row, width] of [[hovered, 1.5], [selected, 2.5]]) {
+  for (const [row, width] of [[hovered, 1.5], ...chosen.map((row) => [row, 2.5])]) {
     if (row < 0 || Number.isNaN(fleet.drawnX[row])) continue;
     ctx.beginPath();
     ctx.arc(view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row]), radius + 6, 0, 2 * Math.PI);

@@ -4,9 +4,9 @@ import { DOUBTFUL, TRACKING } from "../data/packed_tracks.js";
 
 /** @typedef {import("../data/tracks.js").Track} Track @typedef {import("./scene.js").Scene} Scene */
 
-/** @param {Scene} scene @param {Track} track */
-export function drawTrack({ ctx, view, palette }, track) {
-  ctx.strokeStyle = palette.accent;
+/** @param {Scene} scene @param {Track} track @param {string} [colour] of the tag; empty: none */
+export function drawTrack({ ctx, view, palette }, track, colour = "") {
+  ctx.strokeStyle = colour || palette.accent;
   ctx.lineWidth = 1.5;
   ctx.lineJoin = "round";
   ctx.globalAlpha = 0.55;

@@ -21,3 +21,14 @@ export function distancesTo(x, y, bounds) {
   const farY = Math.max(Math.abs(bounds.bottom - y), Math.abs(bounds.top - y));
   return [Math.hypot(nearX, nearY), Math.hypot(farX, farY)];
 }
+
+/**
+ * Return how far an ellipse reaches to the right and up from its middle; 0 for none.
+ * @param {number} major semi-axis @param {number} minor semi-axis @param {number} angle of the major axis, rad
+ * @returns {[number, number]}
+ */
+export function reachOf(major, minor, angle) {
+  if (!(major > 0)) return [0, 0];
+  const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
+  return [Math.hypot(major * cos, minor * sin), Math.hypot(major * sin, minor * cos)];
+}

@@ -9,7 +9,7 @@ const DOUBLE_TAP_PX = 24;
 /** @typedef {import("./map.js").LiveMap} LiveMap */
 /** @typedef {{x: number, y: number}} Point */
 
-/** @param {LiveMap} map @param {(row: number) => void} pick −1: no tag */
+/** @param {LiveMap} map @param {(row: number, isAlso: boolean) => void} pick −1: no tag. isAlso: beside those that are selected */
 export function listen(map, pick) {
   const { canvas } = map;
   const pointers = new Pointers(map, pick);
@@ -29,7 +29,7 @@ class Pointers {
   #pressed = null;
   #lastTap = { x: NaN, y: NaN, time_ms: -Infinity };
 
-  /** @param {LiveMap} map @param {(row: number) => void} pick */
+  /** @param {LiveMap} map @param {(row: number, isAlso: boolean) => void} pick */
   constructor(map, pick) {
     this.map = map;
     this.pick = pick;
@@ -37,6 +37,7 @@ class Pointers {
 
   /** @param {PointerEvent} event */
   down(event) {
+    if (event.button !== 0) return;
     this.map.canvas.setPointerCapture(event.pointerId);
     this.#pressed = this.#at.size === 0 ? place(event) : null;
     this.#at.set(event.pointerId, place(event));
@@ -87,7 +88,7 @@ class Pointers {
     const double = event.timeStamp - this.#lastTap.time_ms < DOUBLE_TAP_MS && apart(at, this.#lastTap) < DOUBLE_TAP_PX;
     this.#lastTap = { ...at, time_ms: event.timeStamp };
     if (double && row < 0) this.map.zoom(2, at.x, at.y);
-    else this.pick(row);
+    else this.pick(row, event.ctrlKey || event.metaKey);
   }
 }
 

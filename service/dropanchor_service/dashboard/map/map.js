@@ -3,10 +3,14 @@
 import { drawAnchors, drawGrid, drawRings, drawScaleBar } from "./draw_site.js";
 import { drawEvidence } from "./draw_evidence.js";
 import { drawEllipses, drawGhosts, drawRangeRings, drawTrails } from "./draw_doubt.js";
-import { drawColours, drawElsewhere, drawLabels, drawMarkers, drawSelection, hasGhosts } from "./draw_tags.js";
+import { Labels } from "./draw_labels.js";
+import { drawColours, drawElsewhere, drawMarkers, drawSelection } from "./draw_tags.js";
 import { DENSITY_ABOVE, drawDensity } from "./density.js";
 import { drawTrack } from "./draw_track.js";
 import { follow } from "../data/motion.js";
+import { MOST_TRACKS } from "../data/recent.js";
+import { union } from "./outside.js";
+import { placesToFit } from "./places_to_fit.js";
 import { readPalette, withoutStates } from "./palette.js";
 import { nearest, rowsInView } from "./scene.js";
 import { View, boundsAround, limited } from "./view.js";
@@ -16,6 +20,8 @@ const MIN_FIT_M = 6;
 const FIT_PADDING_PX = 64;
 /** Share of the padding. A tag that comes closer to the edge makes the map fit all tags again. */
 const FIT_AGAIN = 0.75;
+/** Followed tags that would be drawn so many times larger make the map zoom in. */
+const ZOOM_IN_AT = 2.5;
 const REACH_PX = 18;
 const GLIDE_MS = 90;
 
@@ -25,11 +31,13 @@ export class LiveMap extends EventTarget {
   /** @type {readonly import("./draw_site.js").Anchor[]} */
   anchors = [];
   hovered = -1;
+  /** Boxes of buttons on the map that no name may stand below. @type {number[][]} */
+  hints = [];
   /** Draw on the grid, below everything else. @type {((scene: import("./scene.js").Scene) => void)[]} */
   underlays = [];
   /** Draw over everything else. @type {((scene: import("./scene.js").Scene) => void)[]} */
   overlays = [];
-  /** Return the track of the selected tag. @type {(tag: string | null) => import("../data/tracks.js").Track | null | undefined} */
+  /** Return the track of a selected tag. @type {(tag: string | null) => import("../data/tracks.js").Track | null | undefined} */
   trackOf = () => null;
   /** Return whether a click was meant for something else than the tags. */
   pressed = (/** @type {number} */ _px, /** @type {number} */ _py) => false;
@@ -40,6 +48,7 @@ export class LiveMap extends EventTarget {
   /** For tests and the console: figures of the last drawing. */
   stats = { drawings: 0, ms: 0, visible: 0, elsewhere: 0, density: false, labels: /** @type {number[][]} */ ([]) };
   #ctx;
+  #labels = new Labels();
   #rows = new Int32Array(0);
   #isScheduled = false;
   #last = 0;
@@ -114,6 +123,18 @@ export class LiveMap extends EventTarget {
     this.takeOver();
   }
 
+  /** Show a part of the plane beside what is visible. @param {import("./view.js").Bounds} bounds */
+  showToo(bounds) {
+    this.takeOver();
+    this.#goal = this.view.fitted(union(this.view.free(this.#padding), bounds), this.#padding);
+    this.redraw();
+  }
+
+  /** Return whether the filters show a tag, on this floor. @param {number} row */
+  isShown(row) {
+    return this.choice.shows(this.fleet, row) && !this.isElsewhere(row);
+  }
+
   /** @param {number} factor @param {number} [px] @param {number} [py] */
   zoom(factor, px = this.view.width / 2, py = this.view.height / 2) {
     this.autoFit = false;
@@ -130,6 +151,15 @@ export class LiveMap extends EventTarget {
     if (this.autoFit || Number.isNaN(x + y) || (x > seen.left && x < seen.right && y > seen.bottom && y < seen.top)) return;
     this.#goal = { x, y, scale: this.view.scale };
     this.redraw();
+  }
+
+  /** Return the rows of the tags in a part of the screen, in pixels. @param {import("./view.js").Bounds} box its top is above its bottom */
+  tagsIn({ left, right, top, bottom }) {
+    const { view, fleet } = this;
+    return [...this.#rows].filter((row) => {
+      const [px, py] = [view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row])];
+      return px >= left && px <= right && py >= top && py <= bottom;
+    });
   }
 
   /** Return the row of the tag at a point on the screen; −1: none. @param {number} px @param {number} py */
@@ -165,7 +195,8 @@ export class LiveMap extends EventTarget {
   /** @param {number} elapsed_ms */
   #moveView(elapsed_ms) {
     const row = this.fleet.row(this.choice.selected);
-    if (this.choice.follow && row >= 0 && !Number.isNaN(this.fleet.drawnX[row])) {
+    if (this.choice.follow && this.choice.several.length > 0) this.#keepInView(this.choice.several);
+    else if (this.choice.follow && row >= 0 && !Number.isNaN(this.fleet.drawnX[row])) {
       this.#goal = { x: this.fleet.drawnX[row], y: this.fleet.drawnY[row], scale: this.view.scale };
     } else if (this.autoFit && this.#somethingOutside()) {
       this.#aimAtAll();
@@ -182,16 +213,26 @@ export class LiveMap extends EventTarget {
     return !arrived;
   }
 
+  /** Move and zoom so that all these tags are in view, and only when one of them leaves it or they have become small.
+   * @param {readonly string[]} tags */
+  #keepInView(tags) {
+    const bounds = boundsAround(tags.map((tag) => this.fleet.spot(this.fleet.row(tag))), MIN_FIT_M);
+    if (!bounds) return;
+    const [seen, goal] = [this.view.free(FIT_AGAIN * this.#padding), this.view.fitted(bounds, this.#padding)];
+    const isInside = bounds.left >= seen.left && bounds.right <= seen.right && bounds.bottom >= seen.bottom && bounds.top <= seen.top;
+    if (!isInside || goal.scale > ZOOM_IN_AT * this.view.scale) this.#goal = goal;
+  }
+
   #somethingOutside() {
     const seen = this.view.free(FIT_AGAIN * this.#padding);
-    for (const [x, y] of this.#places()) {
+    for (const [x, y] of placesToFit(this.anchors, this.fleet, this.choice)) {
       if (x < seen.left || x > seen.right || y < seen.bottom || y > seen.top) return true;
     }
     return false;
   }
 
   #aimAtAll() {
-    const bounds = boundsAround(this.#places(), MIN_FIT_M);
+    const bounds = boundsAround(placesToFit(this.anchors, this.fleet, this.choice), MIN_FIT_M);
     this.#goal = this.view.fitted(bounds ?? { left: -5, right: 5, bottom: -5, top: 5 }, this.#padding);
   }
 
@@ -204,28 +245,15 @@ export class LiveMap extends EventTarget {
     return Math.min(FIT_PADDING_PX, this.view.width / 6, this.view.height / 6);
   }
 
-  /** Yield the positions of anchors and tags, and of all hypotheses of ambiguous tags.
-   * @returns {Generator<[number, number]>} */
-  *#places() {
-    for (const anchor of this.anchors) yield [anchor.x, anchor.y];
-    for (let row = 0; row < this.fleet.size; row++) {
-      if (!this.choice.shows(this.fleet, row)) continue;
-      if (hasGhosts(this.fleet, row)) for (const ghost of this.fleet.value.hypotheses[row] ?? []) yield [ghost.x, ghost.y];
-      else yield this.fleet.spot(row);
-    }
-  }
-
   /** @param {number} now_ms */
   #draw(now_ms) {
     const { view, fleet, choice } = this;
     const palette = fleet.current ? this.palette : withoutStates(this.palette);
-    const isShown = (/** @type {number} */ row) => choice.shows(fleet, row);
-    const isHere = (/** @type {number} */ row) => isShown(row) && !this.isElsewhere(row);
-    this.#rows = rowsInView(fleet, view, isShown);
+    this.#rows = rowsInView(fleet, view, (row) => choice.shows(fleet, row));
     const [here, elsewhere] = [this.#rows.filter((row) => !this.isElsewhere(row)), this.#rows.filter(this.isElsewhere)];
     const scene = {
       ctx: this.#ctx, view, palette, fleet, trails: this.trails, roster: this.roster, anchors: this.anchors,
-      rows: here, selected: fleet.row(choice.selected), hovered: this.hovered, now_ms,
+      rows: here, selected: fleet.row(choice.selected), chosen: choice.tags.map((tag) => fleet.row(tag)).filter((row) => row >= 0), hovered: this.hovered, now_ms,
     };
     this.#ctx.setTransform(this.#pixelRatio, 0, 0, this.#pixelRatio, 0, 0);
     this.#ctx.clearRect(0, 0, view.width, view.height);
@@ -235,7 +263,7 @@ export class LiveMap extends EventTarget {
     if (centre) drawRings(this.#ctx, view, palette, centre);
     drawElsewhere(scene, elsewhere);
     this.stats.elsewhere = elsewhere.length;
-    this.#drawTags(scene, isHere);
+    this.#drawTags(scene, (row) => this.isShown(row));
     for (const draw of this.overlays) draw(scene);
     drawScaleBar(this.#ctx, view, palette);
   }
@@ -248,14 +276,16 @@ export class LiveMap extends EventTarget {
     if (density) drawDensity(scene);
     else drawEllipses(scene);
     drawEvidence(scene, this.evidence.of(this.choice.selected));
-    const track = this.trackOf(this.choice.selected);
-    if (track) drawTrack(scene, track);
+    for (const tag of this.choice.tags.slice(0, MOST_TRACKS)) {
+      const track = this.trackOf(tag);
+      if (track) drawTrack(scene, track, scene.fleet.colours[scene.fleet.row(tag)]);
+    }
     drawTrails(scene);
     drawAnchors(scene.ctx, scene.view, scene.palette, scene.anchors);
     drawGhosts(scene, isShown);
-    const apart = density ? { ...scene, rows: Int32Array.from(scene.selected >= 0 ? [scene.selected] : []) } : scene;
+    const apart = density ? { ...scene, rows: Int32Array.from(scene.chosen) } : scene;
     drawSelection(apart);
-    this.stats.labels = drawLabels(apart);
+    this.stats.labels = this.#labels.draw(apart, this.hints);
     drawMarkers(apart);
     drawColours(apart); // above the halos of the dots
   }

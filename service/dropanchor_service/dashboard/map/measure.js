@@ -31,12 +31,13 @@ export class Measure {
   /** @type {Point[]} */
   #points = [];
 
-  /** @param {LiveMap} map @param {HTMLElement} button @param {HTMLElement} answer */
-  constructor(map, button, answer) {
+  /** @param {LiveMap} map @param {HTMLElement} button @param {HTMLElement} answer @param {import("../page/one_panel.js").Panels} panels */
+  constructor(map, button, answer, panels) {
     this.map = map;
     this.button = button;
     this.answer = answer;
-    button.addEventListener("click", () => this.turn(!this.active));
+    panels.add("measure", { isOpen: () => this.active, leave: () => this.turn(false) });
+    button.addEventListener("click", () => panels.toggle("measure", () => this.turn(true)));
     map.overlays.push((scene) => this.#draw(scene));
     map.canvas.addEventListener("keydown", (event) => {
       if (event.key === "Enter" && this.press(map.view.width / 2, map.view.height / 2)) event.preventDefault();
@@ -51,6 +52,13 @@ export class Measure {
   turn(on) {
     this.button.setAttribute("aria-pressed", String(on));
     this.#points = [];
+    this.#update();
+  }
+
+  /** Begin to measure at a point. @param {number} x m @param {number} y m */
+  from(x, y) {
+    this.turn(true);
+    this.#points.push([x, y]);
     this.#update();
   }
 

@@ -11,6 +11,7 @@
  * @property {import("../data/roster.js").Roster} roster
  * @property {Int32Array} rows visible tags
  * @property {number} selected row, or −1
+ * @property {readonly number[]} chosen rows of the selected tags: none, one or several
  * @property {number} hovered row, or −1
  * @property {number} now_ms
  */
@@ -54,6 +55,10 @@ export function alike(scene) {
   }
   return [...groups.values()];
 }
+
+/** Return the height of a tag, m: that of its pose, or else the told one. @param {import("../data/fleet.js").Fleet} fleet
+ * @param {import("../data/roster.js").Roster} roster @param {number} row */
+export const heightOf = ({ number, names }, roster, row) => (Number.isNaN(number.z[row]) ? roster.height(names[row]) : number.z[row]);
 
 /** Return the tag nearest to a point on the screen and within `reach` pixels of it; −1: none.
  * @param {import("../data/fleet.js").Fleet} fleet @param {import("./view.js").View} view @param {Int32Array} rows

@@ -1,10 +1,14 @@
-/** The user's choices: the selected tag, whether the map follows it, and which tags are shown. */
+/** The user's choices: the selected tags, whether the map follows them, and which tags are shown. */
 
 import { STATES } from "../data/states.js";
 
+/** More would fit neither an address nor a table that people compare. */
+export const MOST_SELECTED = 300;
+
 export class Choice extends EventTarget {
-  /** @type {string | null} */
-  #selected = null;
+  /** @type {readonly string[]} */
+  #tags = [];
+  #gathering = false;
   #follow = false;
   #text = "";
   #onlyCare = false;
@@ -18,15 +22,48 @@ export class Choice extends EventTarget {
     this.needsCare = needsCare;
   }
 
+  /** The selected tag; null: none, or several. */
   get selected() {
-    return this.#selected;
+    return this.several.length === 0 ? (this.#tags[0] ?? null) : null;
   }
 
-  /** @param {string | null} tag */
+  /** The selected tags when they are several; empty otherwise. */
+  get several() {
+    return this.#gathering || this.#tags.length > 1 ? this.#tags : [];
+  }
+
+  /** All selected tags: none, one or several. */
+  get tags() {
+    return this.#tags;
+  }
+
+  /** Whether each click or tap adds a tag to the selection or takes it out. */
+  get gathering() {
+    return this.#gathering;
+  }
+
+  /** Select one tag, or none. @param {string | null} tag */
   select(tag) {
-    if (tag === this.#selected) return;
-    this.#selected = tag;
-    if (tag === null) this.#follow = false;
+    this.selectAll(tag === null ? [] : [tag]);
+  }
+
+  /** Select these tags and no other. @param {readonly string[]} tags
+   * @param {boolean} [gathering] whether each click or tap adds one from now on */
+  selectAll(tags, gathering = false) {
+    this.#become([...new Set(tags)].slice(0, MOST_SELECTED), gathering);
+  }
+
+  /** Return the selected tags with one more, or without it if it is one of them. @param {string} tag */
+  toggled(tag) {
+    return this.#tags.includes(tag) ? this.#tags.filter((one) => one !== tag) : [...this.#tags, tag];
+  }
+
+  /** @param {readonly string[]} tags @param {boolean} gathering */
+  #become(tags, gathering) {
+    const isGathering = gathering && tags.length > 0;
+    if (isGathering === this.#gathering && tags.join("\n") === this.#tags.join("\n")) return;
+    [this.#tags, this.#gathering] = [tags, isGathering];
+    if (tags.length === 0) this.#follow = false;
     this.#changed();
   }
 
@@ -35,7 +72,7 @@ export class Choice extends EventTarget {
   }
 
   set follow(on) {
-    const follow = on && this.#selected !== null;
+    const follow = on && this.#tags.length > 0;
     if (follow === this.#follow) return;
     this.#follow = follow;
     this.#changed();

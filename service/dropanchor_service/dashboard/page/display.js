@@ -32,8 +32,10 @@ function choose(name, value) {
   location.reload();
 }
 
-/** Open a dialog with a button, and close it with the button inside it. @param {HTMLElement} button @param {HTMLDialogElement} dialog */
-export function installDialog(button, dialog) {
-  button.addEventListener("click", () => dialog.showModal());
+/** Open a dialog with a button, and close it with the button inside it. @param {HTMLElement} button @param {HTMLDialogElement} dialog
+ * @param {import("./one_panel.js").Panels} panels @param {import("./one_panel.js").PanelName} name @param {() => void} [show] */
+export function installDialog(button, dialog, panels, name, show = () => dialog.showModal()) {
+  panels.addDialog(name, dialog);
+  button.addEventListener("click", () => panels.open(name, show));
   dialog.querySelector('[data-part="close"]')?.addEventListener("click", () => dialog.close());
 }

@@ -6,20 +6,21 @@ import { t } from "../i18n/language.js";
 const KEYS = [
   [["?"], "keys.help"], [["/"], "keys.filter"], [["Esc"], "keys.escape"],
   [["← ↑ → ↓"], "keys.move"], [["+", "−"], "keys.zoom"], [["0"], "keys.fit"], [["Enter"], "keys.measure"],
-  [["↑ ↓", "Enter"], "keys.table"], [["keys.space"], "keys.play"], [["keys.ctrl_z"], "keys.undo"],
+  [["↑ ↓", "Enter"], "keys.table"], [["keys.ctrl_space", "keys.shift_down"], "keys.several"], [["keys.menu"], "keys.here"], [["keys.space"], "keys.play"],
+  [["keys.ctrl_z"], "keys.undo"], [["keys.ctrl_shift_z"], "keys.redo"],
   [["keys.shift_arrows"], "keys.anchor"], [["keys.delete"], "keys.corner"],
 ];
 
 /** Return whether a key goes into a field. @param {KeyboardEvent} event */
 export const isTyping = ({ target }) => target instanceof Element && target.matches("input:not([type=checkbox], [type=range]), select, textarea");
 
-/** @param {HTMLDialogElement} dialog @param {HTMLElement} filter field that `/` goes to */
-export function installKeyboard(dialog, filter) {
+/** @param {HTMLDialogElement} dialog @param {HTMLElement} filter field that `/` goes to @param {() => void} help */
+export function installKeyboard(dialog, filter, help) {
   const list = /** @type {HTMLElement} */ (dialog.querySelector("dl"));
   list.append(...KEYS.map(([keys, message]) => line(keys, t(message))));
   document.addEventListener("keydown", (event) => {
     if (isTyping(event) || event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]")) return;
-    if (event.key === "?") dialog.showModal();
+    if (event.key === "?") help();
     else if (event.key === "/") filter.focus();
     else return;
     event.preventDefault();

@@ -7,12 +7,15 @@ import { Choice } from "./choice.js";
 import { StateChips } from "../panel/chips.js";
 import { chosenSite, Connection } from "../data/connection.js";
 import { Detail } from "../panel/detail.js";
+import { EdgeHints } from "../map/edge_hints.js";
 import { Evidence } from "../data/evidence.js";
+import { Finding } from "./finding.js";
 import { Fleet } from "../data/fleet.js";
 import { length, place } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { translate } from "../i18n/document.js";
 import { listen } from "../map/gestures.js";
+import { guideTo, leadTo } from "./guide.js";
 import { installKeyboard } from "./keyboard.js";
 import { Impaired } from "../panel/impaired.js";
 import { Kiosk, kioskAddress } from "./kiosk.js";
@@ -21,10 +24,15 @@ import { Measure } from "../map/measure.js";
 import { Plans } from "../plan/plans.js";
 import { Notices } from "../panel/notices.js";
 import { Notifications } from "./notifications.js";
+import { Panels } from "./one_panel.js";
 import { Past } from "./past.js";
 import { cornersOf } from "../plan/transform.js";
 import { Roster } from "../data/roster.js";
+import { confirmed } from "../setup/confirm.js";
 import { Setup } from "../setup/setup.js";
+import { KeyPanel } from "./key_panel.js";
+import { installRoom } from "./room.js";
+import { installSections } from "./sections.js";
 import { SharePanel } from "./share_panel.js";
 import { TagTable } from "../panel/table.js";
 import { installDialog, installLanguages, installUnitChoice, showChoices } from "./display.js";
@@ -40,6 +48,7 @@ translate(document);
 /** @template {HTMLElement} T @param {string} id @returns {T} */
 const byId = (id) => /** @type {T} */ (document.getElementById(id));
 
+const panels = new Panels(() => confirmed(/** @type {HTMLDialogElement} */ (byId("confirm")), t("panels.question"), t("panels.discard")));
 const fleet = new Fleet();
 const trails = new Trails();
 const roster = new Roster(fleet);
@@ -50,24 +59,56 @@ const map = new LiveMap(byId("map"), byId("tools"), fleet, trails, roster, choic
 const chips = new StateChips(byId("chips"), fleet, choice);
 const care = new CareChip(/** @type {HTMLButtonElement} */ (byId("care")), byId("care-count"), roster, choice);
 const detail = new Detail(byId("detail"), fleet, roster, choice, evidence);
-const setup = new Setup(map, fleet, roster, choice, connection);
+const setup = new Setup(map, fleet, roster, choice, connection, panels);
 detail.changes = setup.changes;
-const plans = new Plans(map, roster, choice, connection, setup);
+detail.leave = () => select(null);
+const plans = new Plans(map, connection, setup.changes, panels);
 const basemap = new Basemap(map, connection, byId("basemap"), byId("attribution"));
 const notices = new Notices(connection, fleet);
-const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
+const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tags, pick) => finding.pick(tags, pick));
 
-table.isElsewhere = (row) => map.isElsewhere(row);
-const measure = new Measure(map, byId("measure"), byId("measured"));
-map.pressed = (px, py) => measure.press(px, py) || zones.press(px, py);
-const past = new Past({ fleet, trails, roster, evidence, map, choice, connection, updatePanels, byId });
-const zones = new Zones(map, connection, (tag) => fleet.row(tag) >= 0 && select(tag));
-const alerts = new Alerts(byId("alerts"), byId("confirm"), connection, zones);
+table.isElsewhere = (/** @type {number} */ row) => map.isElsewhere(row);
+const edges = new EdgeHints(byId("edges"), map);
+const measure = new Measure(map, byId("measure"), byId("measured"), panels);
+map.pressed = (/** @type {number} */ px, /** @type {number} */ py) => measure.press(px, py) || zones.press(px, py);
+const past = new Past({ fleet, trails, roster, evidence, map, choice, connection, panels, updatePanels, byId });
+detail.heights.floors = () => plans.floors.all;
+detail.heightsInPast = (/** @type {string} */ tag) => past.heightsOf(tag);
+const zones = new Zones(map, connection, setup.changes, (tag) => fleet.row(tag) >= 0 && select(tag), panels);
+const finding = new Finding({ map, fleet, roster, choice, table, setup, plans, zones, measure, past, panels, select, pickAll, byId });
+const alerts = new Alerts(byId("alerts"), byId("confirm"), connection, zones, setup.changes, panels);
 
-/** @param {string | null} tag */
-function select(tag) {
-  choice.select(tag);
-  if (tag === null) return;
+/** Show the details of a tag; null: leave them. @param {string | null} tag @param {() => void} [then] */
+function pick(tag, then = () => {}) {
+  if (tag === null) return panels.close(choice.several.length > 0 ? "several" : "tag");
+  if (tag === choice.selected) return then();
+  return panels.open("tag", () => {
+    choice.select(tag);
+    then();
+  });
+}
+
+/** Select one tag with its details, several without, or none. @param {readonly string[]} tags @param {boolean} [gathering] */
+function pickAll(tags, gathering = false) {
+  const { follow } = choice;
+  if (tags.length > 1 || gathering) {
+    panels.open("several", () => {
+      choice.selectAll(tags, gathering);
+      choice.follow = follow;
+    });
+  } else pick(tags[0] ?? null);
+}
+
+/** @param {string | null} tag @param {() => void} [then] is done once it is selected, which may take an answer to a question */
+function select(tag, then = () => {}) {
+  pick(tag, () => {
+    reveal(/** @type {string} */ (tag));
+    then();
+  });
+}
+
+/** Bring a tag into view, and announce it. @param {string} tag */
+function reveal(tag) {
   map.reveal(fleet.row(tag));
   table.reveal(tag);
   byId("detail").scrollIntoView({ block: "nearest" });
@@ -123,6 +164,7 @@ connection.addEventListener("site", (event) => {
   setup.setSite(site);
   measure.rotation_rad = detail.rotation_rad = site.georeference?.rotation_rad ?? 0;
   past.figures.georeferenced = site.georeference !== null;
+  finding.georeference = site.georeference;
   byId("site").textContent = site.name || site.id;
 });
 
@@ -133,10 +175,12 @@ function updatePanels() {
   chips.update();
   care.update();
   detail.update();
+  finding.update();
   past.update();
   setup.update();
   notices.update();
   address.update();
+  edges.update();
   byId("crowd").hidden = !map.stats.density;
   map.redraw();
 }
@@ -162,22 +206,31 @@ document.addEventListener("keydown", (event) => {
 });
 
 showChoices();
-const address = new ViewAddress(choice, map, /** @type {HTMLInputElement} */ (byId("filter")));
+const address = new ViewAddress(choice, map, /** @type {HTMLInputElement} */ (byId("filter")), pickAll);
 new Notifications(byId("notifications"), zones.log, (event) => zones.pick(event));
 new Kiosk({
   tags: { names: () => table.shown, show: (tag) => select(tag) },
   floors: { names: () => plans.floors.all.map(({ name }) => name), show: (name) => plans.floors.choose(name) },
 });
-listen(map, (row) => select(row < 0 ? null : fleet.names[row]));
+listen(map, (row, isAlso) => finding.pickOnMap(row, isAlso));
 installTheme(byId("theme"), () => map.recolour());
-installDialog(byId("options"), /** @type {HTMLDialogElement} */ (byId("display")));
-installDialog(byId("show-keys"), /** @type {HTMLDialogElement} */ (byId("keys")));
-installKeyboard(/** @type {HTMLDialogElement} */ (byId("keys")), filter);
+installDialog(byId("options"), /** @type {HTMLDialogElement} */ (byId("display")), panels, "display");
+const keys = /** @type {HTMLDialogElement} */ (byId("keys"));
+const showKeys = () => {
+  leadTo(byId("guide"), guideTo(panels.states, document.querySelector("#zones > details[open]") !== null));
+  keys.showModal();
+};
+installDialog(byId("show-keys"), keys, panels, "keys", showKeys);
+installKeyboard(keys, filter, () => panels.open("keys", showKeys));
+installSections(document, panels);
+installRoom(byId);
 const share = new SharePanel(byId("share"), choice);
+const accessKeys = new KeyPanel(byId("access-keys"));
 byId("options").addEventListener("click", () => {
   byId("link").textContent = location.href;
   /** @type {HTMLAnchorElement} */ (byId("kiosk-link")).href = kioskAddress(location);
   share.open();
+  accessKeys.open();
 });
 installLanguages(/** @type {HTMLSelectElement} */ (byId("language")));
 for (const kind of /** @type {const} */ (["length", "velocity"])) installUnitChoice(/** @type {HTMLSelectElement} */ (byId(kind)), kind);
@@ -192,6 +245,7 @@ connection.addEventListener("snapshot", () => past.start(), { once: true });
 Object.defineProperty(window, "dropanchor", {
   value: Object.freeze({
     status: () => connection.status,
+    panels: () => panels.states,
     streaming: () => ({ ...connection.stats }),
     past: () => past.active && { time_ms: past.replay.time_ms, playing: past.replay.playing, loading: past.replay.loading },
     trail: (/** @type {string} */ tag) => {

@@ -51,7 +51,7 @@ export class Notifications {
 
   /** @param {ServiceEvent} event */
   #take(event) {
-    if (!this.#kinds.has(event.type) || globalThis.Notification?.permission !== "granted") return;
+    if (!this.#kinds.has(event.data.retracted_type ?? event.type) || globalThis.Notification?.permission !== "granted") return;
     if (this.#waiting.length === 0) setTimeout(() => this.#show(), COLLECT_MS);
     this.#waiting.push(event);
   }

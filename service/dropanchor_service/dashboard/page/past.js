@@ -2,14 +2,16 @@
 
 import { momentIn, momentValues } from "./address.js";
 import { writeAddress } from "../data/address.js";
-import { api, getJson } from "../data/connection.js";
 import { FiguresPanel } from "../panel/figures_panel.js";
 import { HeatPanel } from "../panel/heat_panel.js";
+import { heightsOfTrack } from "../panel/height_plot.js";
 import { PastBar } from "../panel/past_bar.js";
 import { PastFigures } from "../panel/past_figures.js";
 import { PastTrails } from "../data/past_trails.js";
-import { RecentTrack } from "../data/recent.js";
+import { RecentTracks } from "../data/recent.js";
+import { HOUR_MS, lastHour } from "../data/periods.js";
 import { Replay } from "../data/replay.js";
+import { StoredTimes } from "../data/stored_times.js";
 import { readTracks } from "../data/track_reader.js";
 import { frameAt } from "../data/tracks.js";
 import { TRAIL_S } from "../data/trails.js";
@@ -30,6 +32,7 @@ const ADDRESS_MS = 1000;
  * @property {import("../map/map.js").LiveMap} map
  * @property {import("./choice.js").Choice} choice
  * @property {import("../data/connection.js").Connection} connection
+ * @property {import("./one_panel.js").Panels} panels
  * @property {() => void} updatePanels
  * @property {(id: string) => HTMLElement} byId
  */
@@ -37,8 +40,9 @@ const ADDRESS_MS = 1000;
 export class Past {
   active = false;
   replay = new Replay();
+  #times = new StoredTimes();
   #trails = new PastTrails();
-  #recent = new RecentTrack();
+  #recent = new RecentTracks();
   #hasHistory = false;
   #shownAt = 0;
   #wroteAt = 0;
@@ -46,14 +50,17 @@ export class Past {
   /** @param {Page} page */
   constructor(page) {
     this.page = page;
-    this.bar = new PastBar(/** @type {HTMLFormElement} */ (page.byId("past")), this.replay);
+    this.bar = new PastBar(/** @type {HTMLFormElement} */ (page.byId("past")), this.replay, this.#times);
     this.figures = new PastFigures(page.byId("past-figures"), this.replay, page.choice);
     this.heat = new HeatPanel(this.bar.heatButton, page.byId("heat"), page.map, this.replay, page.choice);
-    new FiguresPanel(this.bar.figuresButton, /** @type {HTMLDialogElement} */ (page.byId("figures")), this.replay, page.choice, page.fleet);
+    new FiguresPanel(this.bar.figuresButton, /** @type {HTMLDialogElement} */ (page.byId("figures")), this.replay, page.choice, page.fleet, page.panels);
     page.map.trackOf = (tag) => this.#trackOf(tag);
-    page.byId("history").addEventListener("click", () => (this.active ? this.leave() : this.enter()));
+    page.panels.add("past", { isOpen: () => this.active, leave: () => this.leave() });
+    page.panels.add("heat", { isOpen: () => this.heat.map.active, leave: () => this.heat.hide() });
+    page.byId("history").addEventListener("click", () => page.panels.toggle("past", () => this.enter()));
     this.bar.addEventListener("leave", () => this.leave());
     this.replay.addEventListener("time", () => this.#show());
+    this.replay.addEventListener("period", () => this.#askForTimes());
     for (const name of ["period", "state"]) this.replay.addEventListener(name, () => this.#writeAddress());
     this.#recent.addEventListener("change", () => page.map.redraw());
     addEventListener("hashchange", () => this.#readAddress());
@@ -64,8 +71,7 @@ export class Past {
   /** Ask whether there is a history, fill the trails from it, and go where the address points. */
   async start() {
     const { fleet, trails, map } = this.page;
-    const history = await getJson(api("history")).catch(() => null);
-    this.#hasHistory = history?.enabled === true;
+    this.#hasHistory = (await this.#times.loadWhole()) === true;
     this.#readAddress();
     if (!this.#hasHistory) return;
     const end_ms = Date.now();
@@ -75,18 +81,37 @@ export class Past {
     if (!fleet.past) map.redraw();
   }
 
-  /** Request the recent track of the selected tag while the page shows the present. */
+  /** Request the recent tracks of the selected tags while the page shows the present. */
   update() {
-    if (this.#hasHistory && !this.active) this.#recent.request(this.page.choice.selected);
+    if (this.#hasHistory && !this.active) this.#recent.request(this.page.choice.tags);
   }
 
   enter() {
     this.#become(true);
-    if (!this.#hasHistory) this.bar.explain(t("past.no_history"));
     const now_ms = Date.now();
     this.bar.suggest(now_ms);
-    if (this.#hasHistory) this.replay.open(now_ms - 3_600_000, now_ms);
+    this.#openNewest(now_ms);
     this.page.byId("past").querySelector("input")?.focus();
+  }
+
+  /** Show the last hour with poses, from the first of them. @param {number} now_ms */
+  async #openNewest(now_ms) {
+    const answer = await this.#times.loadWhole();
+    this.#hasHistory = answer === true;
+    if (answer === false) return this.bar.explain(t("past.no_history"));
+    const { whole } = this.#times;
+    if (answer && !whole) return this.bar.explain(t("past.empty"));
+    const to_ms = Math.min(now_ms, whole?.to_ms ?? now_ms);
+    const stretches = (await this.#times.within(to_ms - HOUR_MS, to_ms)) ?? [];
+    const { from_ms } = lastHour(stretches, to_ms, whole?.from_ms ?? 0);
+    if (this.active && !this.replay.isLoaded && !this.replay.loading) this.replay.open(from_ms, to_ms); // unless a person has chosen one meanwhile
+    return undefined;
+  }
+
+  /** Ask when there are poses in a period that has just been chosen. */
+  #askForTimes() {
+    const { from_ms, to_ms, isLoaded } = this.replay;
+    if (!isLoaded) this.#times.load(from_ms, to_ms);
   }
 
   leave() {
@@ -143,14 +168,21 @@ export class Past {
     return this.active ? this.replay.figures.get(tag) : this.#recent.of(tag);
   }
 
+  /** Return the heights of a tag over the shown period. @param {string} tag */
+  heightsOf(tag) {
+    return heightsOfTrack(this.replay.figures.get(tag), this.replay);
+  }
+
   #readAddress() {
     const moment = momentIn(location.hash);
     if (!moment || (this.active && this.#isShown(moment))) return;
-    this.#become(true);
-    if (!this.#hasHistory) return this.bar.explain(t("past.no_history"));
-    this.replay.speed = moment.speed;
-    this.replay.open(moment.from_ms, moment.to_ms, moment.time_ms);
-    return undefined;
+    this.page.panels.open("past", () => {
+      this.#become(true);
+      if (!this.#hasHistory) return this.bar.explain(t("past.no_history"));
+      this.replay.speed = moment.speed;
+      this.replay.open(moment.from_ms, moment.to_ms, moment.time_ms);
+      return undefined;
+    });
   }
 
   /** @param {import("./address.js").Moment} moment */

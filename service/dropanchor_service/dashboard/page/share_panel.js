@@ -88,7 +88,7 @@ export class SharePanel {
     try {
       await act();
     } catch (error) {
-      this.#say(refusal(error instanceof Error ? error.message : String(error)));
+      this.#say(refusal(error));
     }
   }
 

@@ -1,6 +1,6 @@
-/** What the page shows, in its address: tag, part of the map, and filter. A copied link shows the same. */
+/** What the page shows, in its address: tags, part of the map, and filter. A copied link shows the same. */
 
-import { addressValues, writeAddress } from "../data/address.js";
+import { addressValues, isAddressRead, listIn, listText, writeAddress } from "../data/address.js";
 import { STATES } from "../data/states.js";
 
 const WRITE_MS = 500;
@@ -8,11 +8,13 @@ const WRITE_MS = 500;
 export class ViewAddress {
   #wroteAt = -Infinity;
 
-  /** @param {import("./choice.js").Choice} choice @param {import("../map/map.js").LiveMap} map @param {HTMLInputElement} filter */
-  constructor(choice, map, filter) {
+  /** @param {import("./choice.js").Choice} choice @param {import("../map/map.js").LiveMap} map @param {HTMLInputElement} filter
+   * @param {(tags: readonly string[]) => void} pick */
+  constructor(choice, map, filter, pick) {
     this.choice = choice;
     this.map = map;
     this.filter = filter;
+    this.pick = pick;
     addEventListener("hashchange", () => this.read());
     this.read();
   }
@@ -27,7 +29,8 @@ export class ViewAddress {
       text: filter.value, group: values.get("group") ?? "", onlyCare: values.has("care"),
       hidden: STATES.flatMap(({ name }, number) => (hidden.includes(name) ? [number] : [])),
     });
-    choice.select(values.get("tag"));
+    const tags = listIn(values.get("tags") ?? "");
+    this.pick(tags.length > 0 ? tags : [values.get("tag") ?? []].flat());
     this.#readView(values);
     choice.follow = values.has("follow");
   }
@@ -37,17 +40,17 @@ export class ViewAddress {
     const [x, y] = (values.get("centre") ?? "").split(",").map(Number);
     const scale = Number(values.get("zoom"));
     if (scale > 0 && Number.isFinite(scale + x + y)) this.map.show(x, y, scale);
-    else if (!this.map.autoFit && values.get("tag") === null) this.map.fitAll();
+    else if (!this.map.autoFit && this.choice.tags.length === 0) this.map.fitAll();
   }
 
-  /** Write what the page shows, at most a few times a second. */
+  /** Write what the page shows, at most a few times a second, but not over an address that the page has yet to read. */
   update() {
-    if (performance.now() - this.#wroteAt < WRITE_MS) return;
+    if (performance.now() - this.#wroteAt < WRITE_MS || !isAddressRead()) return;
     this.#wroteAt = performance.now();
-    const { selected, follow, text, group, onlyCare, hiddenStates } = this.choice;
+    const { selected, several, follow, text, group, onlyCare, hiddenStates } = this.choice;
     const hidden = [...hiddenStates].sort().map((state) => STATES[state].name);
     writeAddress({
-      tag: selected, follow: follow ? "1" : null, text: text || null, group: group || null, care: onlyCare ? "1" : null,
+      tag: selected, tags: several.length > 0 ? listText(several) : null, follow: follow ? "1" : null, text: text || null, group: group || null, care: onlyCare ? "1" : null,
       hide: hidden.join() || null, ...this.#viewValues(),
     });
   }

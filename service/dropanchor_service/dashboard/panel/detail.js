@@ -2,11 +2,13 @@
 
 import { hasKey } from "../data/access.js";
 import { api } from "../data/connection.js";
-import { UNKNOWN, age, compass, count, ellipse, length, percent, place, sigmaText, speed, turnRate, words } from "../data/format.js";
+import { UNKNOWN, accuracy, age, compass, count, floor, height, length, percent, place, speed, turnRate, words } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { said } from "../i18n/said.js";
 import { AMBIGUOUS } from "../data/states.js";
 import { clockText, healthTexts } from "./care.js";
+import { HeightPlot, heightsOfMinute } from "./height_plot.js";
+import { hintOf } from "./hint.js";
 import { Plots } from "./plots.js";
 import { symbol } from "../map/symbols.js";
 
@@ -15,6 +17,10 @@ import { symbol } from "../map/symbols.js";
 export class Detail {
   /** Direction of the x axis, counter-clockwise from east. */
   #rotation_rad = 0;
+  /** Leave the details. */
+  leave = () => this.choice.select(null);
+  /** Return the heights of a tag over the period of the past that the page shows. @type {(tag: string) => import("./height_plot.js").Heights | null} */
+  heightsInPast = () => null;
   /** How settings are changed; null until the page knows. @type {import("../data/changes.js").Changes | null} */
   changes = null;
 
@@ -27,9 +33,10 @@ export class Detail {
     this.choice = choice;
     this.evidence = evidence;
     this.plots = new Plots(this.#part("plots"));
+    this.heights = new HeightPlot(this.#part("heights"));
     this.follow = /** @type {HTMLButtonElement} */ (this.#part("follow"));
     this.follow.addEventListener("click", () => (choice.follow = !choice.follow));
-    this.#part("close").addEventListener("click", () => choice.select(null));
+    this.#part("close").addEventListener("click", () => this.leave());
     choice.addEventListener("change", () => this.update());
     evidence.addEventListener("change", () => this.#explain());
     this.update();
@@ -85,8 +92,8 @@ export class Detail {
     const reason = current ? value.reason[row] : null;
     put(this.#part("meaning"), state.meaning);
     put(this.#part("reason"), reason ? words(reason) : "");
-    const hint = (current ? value.hint[row] || this.roster.of(name)?.hint : null) ?? "";
-    put(this.#part("hint"), said(hint));
+    const hint = current ? hintOf(this.fleet, this.roster, row) : "";
+    put(this.#part("hint"), hint);
     this.#part("hint").hidden = hint === "";
     this.follow.setAttribute("aria-pressed", String(this.choice.follow));
     this.#part("json").setAttribute("href", api(`tags/${encodeURIComponent(name)}/pose`).href);
@@ -101,19 +108,23 @@ export class Detail {
     const texts = {
       x: length(number("x")),
       y: length(number("y")),
-      sigma: sigmaText(number("sigma_pos_m")),
-      ellipse: ellipse(number("semi_major_m"), number("semi_minor_m")),
+      accuracy: accuracy(number("semi_major_m"), number("semi_minor_m")),
+      height: height(number("z"), number("z_std_m"), this.fleet.value.z_source[row]),
+      floor: floor(this.fleet.value.floor[row], number("floor_probability")),
       heading: compass(number("heading_rad") + this.#rotation_rad),
       speed: speed(number("speed_mps")),
       turn: turnRate(number("yaw_rate_radps")),
       range: length(number("range_m")),
       anchor: anchor ?? UNKNOWN,
       mode: percent(number("p_mode")),
-      sight: Number.isNaN(number("sigma_obs_m")) ? UNKNOWN : sigmaText(number("sigma_obs_m")),
+      sight: length(number("sigma_obs_m")),
       age: age(this.fleet.age(row, performance.now())),
       online: !this.fleet.current || this.fleet.past ? UNKNOWN : t(this.fleet.online[row] ? "figure.online" : "figure.offline"),
     };
     for (const [name, value] of Object.entries(texts)) put(this.#part(`v-${name}`), value);
+    this.#part("floor").hidden = texts.floor === "";
+    const name = this.fleet.names[row];
+    this.heights.show(this.fleet.past ? this.heightsInPast(name) : heightsOfMinute(this.#explanation));
   }
 
   /** @param {string} tag */
@@ -145,8 +156,8 @@ export class Detail {
     const shown = JSON.stringify([tag, cares, mayWrite]);
     if (list.dataset.shown === shown) return;
     list.dataset.shown = shown;
-    list.replaceChildren(...cares.map(({ hint, setting }) => {
-      const item = Object.assign(document.createElement("li"), { textContent: said(hint) });
+    list.replaceChildren(...cares.map(({ hint, hint_phrase, setting }) => {
+      const item = Object.assign(document.createElement("li"), { textContent: said(hint, hint_phrase) });
       if (setting && mayWrite) item.append(" ", this.#acceptButton(tag, setting));
       return item;
     }));

@@ -19,13 +19,15 @@ export class FiguresPanel {
   #asked = 0;
 
   /** @param {HTMLElement} button @param {HTMLDialogElement} dialog @param {import("../data/replay.js").Replay} replay
-   * @param {import("../page/choice.js").Choice} choice @param {import("../data/fleet.js").Fleet} fleet */
-  constructor(button, dialog, replay, choice, fleet) {
+   * @param {import("../page/choice.js").Choice} choice @param {import("../data/fleet.js").Fleet} fleet
+   * @param {import("../page/one_panel.js").Panels} panels */
+  constructor(button, dialog, replay, choice, fleet, panels) {
     this.dialog = dialog;
     this.replay = replay;
     this.choice = choice;
     this.fleet = fleet;
-    button.addEventListener("click", () => this.#open());
+    panels.addDialog("figures", dialog);
+    button.addEventListener("click", () => panels.open("figures", () => this.#open()));
     this.#part("close").addEventListener("click", () => dialog.close());
     this.#part("save").addEventListener("click", () => this.#save());
     this.#part("si").hidden = isSi;

@@ -27,8 +27,8 @@ export class Impaired {
 
   async #ask() {
     try {
-      const { impaired } = await getJson(readyUrl());
-      const text = impaired.length ? t("impaired.text", { what: impaired.map(said).join("; ") }) : "";
+      const { impaired, impaired_phrases } = await getJson(readyUrl());
+      const text = impaired.length ? t("impaired.text", { what: impaired.map((/** @type {string} */ text, /** @type {number} */ i) => said(text, impaired_phrases[i])).join("; ") }) : "";
       if (this.banner.textContent !== text) this.banner.textContent = text;
       this.banner.hidden = text === "";
     } catch {

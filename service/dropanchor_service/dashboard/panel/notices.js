@@ -4,7 +4,6 @@ import { hasKey, storeKey } from "../data/access.js";
 import { api, getJson } from "../data/connection.js";
 import { age } from "../data/format.js";
 import { t } from "../i18n/language.js";
-import { said } from "../i18n/said.js";
 import { shareToken } from "../data/shared.js";
 import { SharedNotice } from "./shared_notice.js";
 
@@ -34,7 +33,7 @@ export class Notices {
     document.title = isPast ? t("page.past_title") : status === "lost" ? t("page.lost_title") : "Dropanchor";
     write(byId("lost-text"), t("lost.text", { age: age((performance.now() - lostAt) / 1000) }));
     byId("starting").hidden = status !== "starting";
-    write(byId("progress"), said(progress));
+    write(byId("progress"), progress);
     byId("locked").hidden = status !== "locked" || shareToken !== null;
     this.#shared.update(status === "locked");
     byId("refused").hidden = !hasKey();
@@ -73,12 +72,14 @@ function write(element, text) {
 function installCopy(button) {
   button.addEventListener("click", async () => {
     const source = byId(/** @type {HTMLElement} */ (button).dataset.copies ?? "");
+    const field = source instanceof HTMLInputElement ? source : null;
     try {
-      await navigator.clipboard.writeText(source.textContent ?? "");
+      await navigator.clipboard.writeText(field?.value ?? source.textContent ?? "");
       button.textContent = t("copy.copied");
-    } catch {
-      getSelection()?.selectAllChildren(source);
-      button.textContent = t("copy.press");
+    } catch { // without HTTPS there is no clipboard, but a selection can be copied
+      if (field) field.select();
+      else getSelection()?.selectAllChildren(source);
+      button.textContent = t(document.execCommand("copy") ? "copy.copied" : "copy.press");
     }
     setTimeout(() => (button.textContent = t("copy.copy")), 1600);
   });

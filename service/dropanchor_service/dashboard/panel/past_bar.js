@@ -1,18 +1,23 @@
 /** The controls of the past: which period, when in it, how fast, and a clear note that this is not the present. */
 
+import { HOUR_MS, LONGEST_MS, QUICK, dayOf, gapAt, quickPeriod, stripPath } from "../data/periods.js";
 import { SPEEDS } from "../data/replay.js";
 import { decimal, t, timeText } from "../i18n/language.js";
 
-const HOUR_MS = 3_600_000;
+/** A shorter gap is not worth a sentence. */
+const GAP_MS = 60_000;
 
 /** @typedef {import("../data/replay.js").Replay} Replay */
 
 export class PastBar extends EventTarget {
-  /** @param {HTMLFormElement} bar @param {Replay} replay */
-  constructor(bar, replay) {
+  #refusal = ""; // what is wrong with the period that was chosen last
+
+  /** @param {HTMLFormElement} bar @param {Replay} replay @param {import("../data/stored_times.js").StoredTimes} times */
+  constructor(bar, replay, times) {
     super();
     this.bar = bar;
     this.replay = replay;
+    this.times = times;
     this.heatButton = this.#part("heat");
     this.figuresButton = this.#part("figures");
     this.slider = /** @type {HTMLInputElement} */ (this.#part("slider"));
@@ -23,7 +28,11 @@ export class PastBar extends EventTarget {
     this.#part("leave").addEventListener("click", () => this.dispatchEvent(new Event("leave")));
     this.slider.addEventListener("input", () => replay.seek(replay.from_ms + Number(this.slider.value) * 1000));
     this.speed.addEventListener("change", () => (replay.speed = Number(this.speed.value)));
+    for (const choice of QUICK) this.#part(choice).addEventListener("click", () => this.#open(quickPeriod(choice, Date.now())));
+    this.#part("day").addEventListener("change", () => this.#chooseDay());
+    this.#part("other").addEventListener("click", () => this.#unfold());
     replay.addEventListener("period", () => this.#showPeriod());
+    times.addEventListener("change", () => this.#showStretches());
     for (const name of ["time", "state"]) replay.addEventListener(name, () => this.update());
   }
 
@@ -51,8 +60,33 @@ export class PastBar extends EventTarget {
     play.dataset.playing = String(replay.playing);
     this.speed.value = String(replay.speed);
     this.bar.setAttribute("aria-busy", String(replay.loading));
-    const nothing = !replay.loading && replay.problem === "" && replay.isLoaded && replay.figures.size === 0;
-    this.explain(nothing ? t("past.nothing") : replay.problem);
+    const isDone = !replay.loading && replay.problem === "" && replay.isLoaded;
+    const nothing = isDone && replay.figures.size === 0;
+    this.explain(this.#refusal || (nothing ? this.#nothing() : replay.problem));
+    put(this.#part("gap"), isDone && !nothing ? this.#gap() : "");
+  }
+
+  /** Say that there is nothing, and when there is something. */
+  #nothing() {
+    const { whole } = this.times;
+    const all = whole ? t("past.whole", { from: localTime(whole.from_ms), to: localTime(whole.to_ms) }) : "";
+    return `${t("past.nothing")} ${all}`.trim();
+  }
+
+  /** Say that no pose is stored for a while around the shown time. */
+  #gap() {
+    const gap = this.times.stretches && gapAt(this.times.stretches, this.replay, this.replay.time_ms);
+    if (!gap || gap.to_ms - gap.from_ms < GAP_MS) return "";
+    const isOneDay = new Date(gap.from_ms).toDateString() === new Date(gap.to_ms).toDateString();
+    const short = (/** @type {number} */ time_ms) => timeText(time_ms, { weekday: isOneDay ? undefined : "short", hour: "2-digit", minute: "2-digit" });
+    return t("past.gap", { from: short(gap.from_ms), to: short(gap.to_ms) });
+  }
+
+  #showStretches() {
+    const { stretches } = this.times;
+    this.#part("strip").toggleAttribute("hidden", stretches === null);
+    this.#part("stored").setAttribute("d", stretches ? stripPath(stretches, this.replay) : "");
+    this.update();
   }
 
   #showPeriod() {
@@ -66,9 +100,33 @@ export class PastBar extends EventTarget {
   #choose(event) {
     event.preventDefault();
     const [from_ms, to_ms] = ["from", "to"].map((name) => new Date(this.#input(name).value).getTime());
-    const isRight = to_ms > from_ms && to_ms - from_ms <= 31 * 24 * HOUR_MS;
-    if (isRight) this.replay.open(from_ms, to_ms);
-    else this.explain(t("past.order"));
+    const isRight = to_ms > from_ms && to_ms - from_ms <= LONGEST_MS;
+    if (isRight) this.#open({ from_ms, to_ms });
+    else this.#refuse(t("past.order"));
+  }
+
+  #chooseDay() {
+    const day = dayOf(this.#input("day").value, Date.now());
+    if (day) this.#open(day);
+    else if (this.#input("day").value !== "") this.#refuse(t("past.no_day"));
+  }
+
+  /** Say what is wrong with a chosen period, until another one is opened. @param {string} text */
+  #refuse(text) {
+    this.#refusal = text;
+    this.update();
+  }
+
+  /** Show or hide the start and the end, which a phone has no room for. */
+  #unfold() {
+    const isOpen = this.bar.classList.toggle("unfolded");
+    this.#part("other").setAttribute("aria-expanded", String(isOpen));
+  }
+
+  /** @param {import("../data/periods.js").Period} period */
+  #open({ from_ms, to_ms }) {
+    this.#refusal = "";
+    this.replay.open(from_ms, to_ms);
   }
 
   /** @param {string} name @param {number} time_ms */

@@ -11,6 +11,8 @@ import { isSi } from "../data/units.js";
 const GEOREFERENCED = ["geojson", "gpx"];
 
 export class PastFigures {
+  isGeoreferenced = false;
+
   /** @param {HTMLElement} box @param {import("../data/replay.js").Replay} replay @param {import("../page/choice.js").Choice} choice */
   constructor(box, replay, choice) {
     this.box = box;
@@ -26,6 +28,7 @@ export class PastFigures {
 
   /** Whether the site has a georeference, without which there are no latitudes and longitudes. @param {boolean} is */
   set georeferenced(is) {
+    this.isGeoreferenced = is;
     for (const button of this.box.querySelectorAll("button")) button.disabled = !is && GEOREFERENCED.includes(button.dataset.format ?? "");
     this.#part("no-georeference").hidden = is;
   }

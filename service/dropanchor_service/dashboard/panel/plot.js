@@ -53,6 +53,16 @@ export class Plot {
     return HEIGHT - BOTTOM - ((value - this.#low) / (this.#high - this.#low)) * (HEIGHT - TOP - BOTTOM);
   }
 
+  /** Return whether the scale contains a value. @param {number} value */
+  shows(value) {
+    return value >= this.#low && value <= this.#high;
+  }
+
+  /** Draw a line from the bottom to the top. @param {string} name @param {number} t */
+  upright(name, t) {
+    this.line(name, [{ t, value: this.#low }, { t, value: this.#high }]);
+  }
+
   /** @param {string} name class of the path @param {readonly Point[]} points */
   line(name, points) {
     this.#path(name, points.map(({ t, value }, i) => `${i ? "L" : "M"}${this.#at(t, value)}`).join(""));
@@ -88,7 +98,7 @@ export class Plot {
     }
     const seconds = roundStep((this.#span * SECONDS_PX) / this.#width);
     for (const t of multiples(-this.#span, 0, seconds)) {
-      this.line("grid", [{ t, value: this.#low }, { t, value: this.#high }]);
+      this.upright("grid", t);
     }
   }
 

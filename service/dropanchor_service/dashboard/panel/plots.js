@@ -33,6 +33,7 @@ export class Plots {
     const before = (/** @type {number} */ t_ns) => (t_ns - end) / 1e9;
     const ranges = innovations.filter(({ kind }) => kind === "range");
     this.#ranges(ranges, span, before);
+    this.#put("scatter", scatter(explanation));
     this.#innovations(innovations, span, before);
     this.#speeds(explanation, ranges, span, before);
     this.#put("span", t("plots.span", { span: `${fixed(span, 0)} s` }));
@@ -111,6 +112,13 @@ export class Plots {
     const element = /** @type {HTMLElement} */ (this.panel.querySelector(`[data-text="${name}"]`));
     if (element.textContent !== text) element.textContent = text;
   }
+}
+
+/** Return how much the ranges scatter, and how much of it lasts. @param {Explanation} explanation */
+function scatter({ range_errors: errors }) {
+  if (!errors) return "";
+  const all = length(Math.hypot(errors.white_m, errors.lasting_m));
+  return errors.lasting_m > errors.white_m ? t("plots.scatter_lasting", { all, lasting: length(errors.lasting_m) }) : t("plots.scatter", { all });
 }
 
 /** @param {readonly Innovation[]} innovations */

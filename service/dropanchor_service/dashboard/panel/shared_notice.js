@@ -23,8 +23,8 @@ export class SharedNotice {
     byId("shared").hidden = shareClaims === null || locked;
     byId("ended").hidden = shareToken === null || !locked;
     if (!locked) return;
-    const isExpired = shareClaims !== null && shareClaims.exp * 1000 <= Date.now();
-    const text = isExpired ? t("shared.expired", { time: dateText(shareClaims.exp) }) : t("shared.revoked");
+    const expired_s = shareClaims !== null && shareClaims.exp * 1000 <= Date.now() ? shareClaims.exp : null;
+    const text = expired_s !== null ? t("shared.expired", { time: dateText(expired_s) }) : t("shared.revoked");
     if (byId("ended-why").textContent !== text) byId("ended-why").textContent = text;
   }
 }

@@ -1,18 +1,21 @@
 /** The table of all tags. Only visible rows exist in the document, so that ten thousand tags stay fast. */
 
-import { UNKNOWN, age, coordinate, count, sigma, speedNumber, tagCount } from "../data/format.js";
+import { UNKNOWN, age, coordinate, count, half, speedNumber, tagCount } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { Order } from "../data/order.js";
 import { NameColumn } from "../data/names.js";
 import { symbol } from "../map/symbols.js";
 
 /** @typedef {import("../data/fleet.js").Fleet} Fleet */
+/** @typedef {"only" | "toggle" | "range"} Pick how a row was chosen: alone, in addition, or all rows up to it */
 /** @typedef {{element: HTMLTableRowElement, cells: HTMLTableCellElement[], use: SVGUseElement}} Line */
 
 const ROW_PX = 32;
+/** On a phone a row is as high as a finger needs. */
+const TOUCH_ROW_PX = 44;
 const SPARE = 4;
 const NAME_LINES = 2;
-const COLUMNS = ["tag", "state", "x", "y", "sigma", "speed", "age", "online"];
+const COLUMNS = ["tag", "state", "x", "y", "accuracy", "speed", "age", "online"];
 
 export class TagTable {
   /** @type {import("../data/order.js").Sort} */
@@ -24,11 +27,12 @@ export class TagTable {
   #lines = [];
   #names = new NameColumn();
   #active = "";
+  #phone = matchMedia("(max-width: 560px)");
   /** Return whether a tag is on a floor that the map does not show. */
   isElsewhere = (/** @type {number} */ _row) => false;
 
   /** @param {HTMLElement} box scrolls and holds the table @param {HTMLElement} count @param {Fleet} fleet
-   * @param {import("../page/choice.js").Choice} choice @param {(tag: string) => void} chosen */
+   * @param {import("../page/choice.js").Choice} choice @param {(tags: string[], pick: Pick) => void} chosen */
   constructor(box, count, fleet, choice, chosen) {
     this.box = box;
     this.count = count;
@@ -37,6 +41,7 @@ export class TagTable {
     this.chosen = chosen;
     this.body = /** @type {HTMLTableSectionElement} */ (box.querySelector("tbody"));
     this.body.addEventListener("click", (event) => this.#onClick(event));
+    this.body.addEventListener("mousedown", (event) => event.shiftKey && event.preventDefault()); // it would select text
     box.addEventListener("scroll", () => this.#paint(), { passive: true });
     box.addEventListener("keydown", (event) => this.#onKey(event));
     for (const button of box.querySelectorAll("button[data-column]")) this.#listenToHead(button);
@@ -58,15 +63,31 @@ export class TagTable {
     return this.#rows.map((row) => this.fleet.names[row]);
   }
 
+  /** The row that arrow keys have reached, and the id of its element. */
+  get active() {
+    const line = this.#lineOf(this.#active);
+    return line && this.fleet.row(this.#active) >= 0 ? { tag: this.#active, id: line.element.id } : null;
+  }
+
+  /** Return the shown tag with this name or id, whatever its case; null: none. @param {string} text */
+  called(text) {
+    const row = this.#rows.find((one) => [this.fleet.labels[one], this.fleet.names[one]].some((name) => name.toLowerCase() === text));
+    return row === undefined ? null : this.fleet.names[row];
+  }
+
   /** Scroll to a tag. @param {string} tag */
   reveal(tag) {
     const place = this.#rows.indexOf(this.fleet.row(tag));
     this.#active = tag;
     if (place < 0) return;
-    const [top, height] = [place * ROW_PX, this.box.clientHeight - this.#headHeight()];
+    const [top, height] = [place * this.#rowHeight, this.box.clientHeight - this.#headHeight()];
     if (top < this.box.scrollTop) this.box.scrollTop = top;
-    else if (top + ROW_PX > this.box.scrollTop + height) this.box.scrollTop = top + ROW_PX - height;
+    else if (top + this.#rowHeight > this.box.scrollTop + height) this.box.scrollTop = top + this.#rowHeight - height;
     this.#paint();
+  }
+
+  get #rowHeight() {
+    return this.#phone.matches ? TOUCH_ROW_PX : ROW_PX;
   }
 
   #headHeight() {
@@ -74,12 +95,12 @@ export class TagTable {
   }
 
   #paint() {
-    const visible = Math.ceil(this.box.clientHeight / ROW_PX) + SPARE;
+    const visible = Math.ceil(this.box.clientHeight / this.#rowHeight) + SPARE;
     const last = Math.max(0, this.#rows.length - visible);
-    const first = Math.min(last, Math.max(0, Math.floor(this.box.scrollTop / ROW_PX) - SPARE / 2));
+    const first = Math.min(last, Math.max(0, Math.floor(this.box.scrollTop / this.#rowHeight) - SPARE / 2));
     const rows = this.#rows.slice(first, first + visible);
-    this.body.style.setProperty("--before", `${first * ROW_PX}px`);
-    this.body.style.setProperty("--after", `${Math.max(0, this.#rows.length - first - rows.length) * ROW_PX}px`);
+    this.body.style.setProperty("--before", `${first * this.#rowHeight}px`);
+    this.body.style.setProperty("--after", `${Math.max(0, this.#rows.length - first - rows.length) * this.#rowHeight}px`);
     while (this.#lines.length < rows.length) this.#addLine();
     if (this.#lines.length > 0) this.#names.measure(nameOf(this.#lines[0]), NAME_LINES);
     const now_ms = performance.now();
@@ -112,7 +133,7 @@ export class TagTable {
   /** @param {Line} line @param {number} row @param {number} place @param {number} now_ms */
   #fill(line, row, place, now_ms) {
     const { fleet } = this;
-    const { x, y, sigma_pos_m, speed_mps } = fleet.number;
+    const { x, y, semi_major_m, speed_mps } = fleet.number;
     const state = fleet.style(row);
     const seconds = fleet.age(row, now_ms);
     const name = fleet.names[row];
@@ -121,10 +142,10 @@ export class TagTable {
     set(line.element.dataset, "state", state.name);
     set(line.element.dataset, "stale", String(fleet.staleness(row, now_ms)));
     attribute(line.element, "aria-rowindex", String(place + 2));
-    attribute(line.element, "aria-selected", String(name === this.choice.selected));
+    attribute(line.element, "aria-selected", String(this.choice.tags.includes(name)));
     attribute(line.use, "href", `#s-${state.name}`);
     const texts = [
-      this.#names.of(label), state.label, coordinate(x[row]), coordinate(y[row]), sigma(sigma_pos_m[row]), speedNumber(speed_mps[row], 2),
+      this.#names.of(label), state.label, coordinate(x[row]), coordinate(y[row]), half(semi_major_m[row]), speedNumber(speed_mps[row], 2),
       age(seconds), !fleet.current ? UNKNOWN : t(fleet.online[row] ? "figure.online" : "figure.offline"),
     ];
     texts.forEach((value, i) => text(i === 0 ? nameOf(line) : line.cells[i], value));
@@ -139,10 +160,15 @@ export class TagTable {
   }
 
   #pointAtActive() {
-    const line = this.#lines.find(({ element }) => !element.hidden && element.dataset.tag === this.#active);
+    const line = this.#lineOf(this.#active);
     for (const { element } of this.#lines) element.classList.toggle("active", element === line?.element);
     if (line) this.box.setAttribute("aria-activedescendant", line.element.id);
     else this.box.removeAttribute("aria-activedescendant");
+  }
+
+  /** @param {string} tag */
+  #lineOf(tag) {
+    return this.#lines.find(({ element }) => !element.hidden && element.dataset.tag === tag);
   }
 
   /** @param {Element} button */
@@ -160,20 +186,41 @@ export class TagTable {
   #onClick(event) {
     const tag = /** @type {HTMLElement} */ (event.target).closest("tr")?.dataset.tag;
     if (tag === undefined) return;
+    const from = this.#active;
     this.#active = tag;
-    this.chosen(tag);
+    if (event.shiftKey) this.chosen(this.#between(from, tag), "range");
+    else this.chosen([tag], event.ctrlKey || event.metaKey ? "toggle" : "only");
+    this.#pointAtActive();
+  }
+
+  /** Return the shown tags from one to another; only the other where the first is not shown. @param {string} from @param {string} to */
+  #between(from, to) {
+    const [first, last] = [from, to].map((tag) => this.#rows.indexOf(this.fleet.row(tag)));
+    return first < 0 ? [to] : this.shown.slice(Math.min(first, last), Math.max(first, last) + 1);
   }
 
   /** @param {KeyboardEvent} event */
   #onKey(event) {
-    if (event.target !== this.box) return;
-    const page = Math.max(1, Math.floor(this.box.clientHeight / ROW_PX) - 2);
+    if (event.target !== this.box || event.altKey) return;
+    const isAlso = event.ctrlKey || event.metaKey;
+    if (isAlso && event.key === "a") this.chosen(this.shown, "range");
+    else if (!this.step(event) && (event.key === "Enter" || event.key === " ") && this.fleet.row(this.#active) >= 0) {
+      this.chosen([this.#active], isAlso ? "toggle" : "only");
+    } else return;
+    event.preventDefault();
+  }
+
+  /** Move to another row if this key does that, and return whether it does. @param {KeyboardEvent} event */
+  step(event) {
+    const page = Math.max(1, Math.floor(this.box.clientHeight / this.#rowHeight) - 2);
     const steps = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page, Home: -Infinity, End: Infinity };
     const step = steps[/** @type {keyof typeof steps} */ (event.key)];
-    if (step !== undefined) this.#moveActive(step);
-    else if ((event.key === "Enter" || event.key === " ") && this.fleet.row(this.#active) >= 0) this.chosen(this.#active);
-    else return;
+    if (step === undefined) return false;
+    const from = this.#active;
+    this.#moveActive(step);
+    if (event.shiftKey) this.chosen([...this.choice.tags, ...this.#between(from, this.#active)], "range");
     event.preventDefault();
+    return true;
   }
 
   /** @param {number} step */

@@ -15,14 +15,13 @@ export function floorsOf(plans) {
 }
 
 /** @param {FloorOfSite} floor @param {number} height_m */
-export const reaches = ({ ranges }, height_m) => ranges.some(([bottom, top]) => height_m >= bottom && height_m < top);
+const reaches = ({ ranges }, height_m) => ranges.some(([bottom, top]) => height_m >= bottom && height_m < top);
 
-/** Return whether a height is on another floor. 0 m is what a tag has whose height nobody has set, so it says nothing.
- * @param {readonly FloorOfSite[]} floors @param {FloorOfSite | null} chosen @param {number} height_m */
-export function isElsewhere(floors, chosen, height_m) {
-  if (!chosen || height_m === 0 || reaches(chosen, height_m)) return false;
-  return floors.some((floor) => reaches(floor, height_m));
-}
+const BELIEVED = 0.9;
+
+/** Return whether a tag is not known to be on the chosen floor. A tag without any floor may be on it.
+ * @param {FloorOfSite | null} chosen @param {string | null | undefined} floor of the pose @param {number} probability of that floor */
+export const isElsewhere = (chosen, floor, probability) => !!chosen && !!floor && !(floor === chosen.name && probability > BELIEVED);
 
 /** Event: "change". */
 export class Floors extends EventTarget {

@@ -5,6 +5,8 @@
 const SEMI_MAJOR_M = 6378137;
 const ECCENTRICITY_SQUARED = 0.0066943799901413165;
 const RAD = Math.PI / 180;
+/** Each leaves less than a hundredth of the error: the Earth is not quite a sphere. */
+const REFINEMENTS = 6;
 
 /** Return the latitude and the longitude in a text such as "52.5163, 13.3777"; null: it holds no such pair. @param {string} text */
 export function latLonIn(text) {
@@ -23,6 +25,20 @@ export function siteOfLatLon(origin, point) {
   const north = cosLat * dz - sinLat * (cosLon * dx + sinLon * dy);
   const [sin, cos] = [Math.sin(origin.rotation_rad), Math.cos(origin.rotation_rad)];
   return [cos * east + sin * north, cos * north - sin * east];
+}
+
+/** Return the latitude and the longitude of a place in the site frame: the one that `siteOfLatLon` puts there.
+ * @param {Georeference} origin @param {number} x m @param {number} y m */
+export function latLonOfSite(origin, x, y) {
+  let { lat, lon } = origin;
+  const [sin, cos] = [Math.sin(origin.rotation_rad), Math.cos(origin.rotation_rad)];
+  for (let turn = 0; turn < REFINEMENTS; turn++) {
+    const found = siteOfLatLon(origin, { lat, lon });
+    const [dx, dy] = [x - found[0], y - found[1]];
+    lat += (sin * dx + cos * dy) / SEMI_MAJOR_M / RAD;
+    lon += (cos * dx - sin * dy) / (SEMI_MAJOR_M * Math.cos(lat * RAD)) / RAD;
+  }
+  return { lat, lon };
 }
 
 /** @param {{lat: number, lon: number}} point on the ellipsoid */

@@ -1,11 +1,15 @@
 /** Add, align, change and delete floor plans. A draft is on the map of this page only, until it is saved. */
 
 import { boundsAround } from "../map/view.js";
+import { DraftSteps } from "../data/draft_steps.js";
+import { Saving } from "../data/saving.js";
 import { newId } from "../zones/editor.js";
 import { toCentimetre } from "../setup/gestures.js";
+import { newName } from "./plan_name.js";
 import { pathOf } from "./plan_store.js";
 import { t } from "../i18n/language.js";
-import { aligned, cornersOf, isInside, isPlaced, pixelOf } from "./transform.js";
+import { said } from "../i18n/said.js";
+import { aligned, cornersOf, inMiddleOf, isInside, isPlaced, pixelOf } from "./transform.js";
 
 /** @typedef {import("./plan_store.js").Plan} Plan @typedef {import("./transform.js").Point} Point */
 /** @typedef {Plan & {points: Point[]}} Draft */
@@ -15,8 +19,6 @@ import { aligned, cornersOf, isInside, isPlaced, pixelOf } from "./transform.js"
 const SNAP_PX = 18;
 const STEP_M = 0.1;
 const LARGE_STEP_M = 1;
-/** Share of the map that a new plan takes. */
-const NEW_SHARE = 0.6;
 const PADDING_PX = 48;
 const MIN_SIDE_M = 0.1;
 const MAX_POINTS = 20;
@@ -33,8 +35,11 @@ export class PlanEditor extends EventTarget {
   distance_m = null;
   /** Where the site lies on the Earth, if that is known. @type {import("./geodesy.js").Georeference | null} */
   georeference = null;
+  /** Whether the last press in search of a place on the plan was beside it. */
+  isBeside = false;
   /** Grows whenever the draft is read anew. */
   revision = 0;
+  saving = new Saving();
   #isDirty = false;
   /** @type {Promise<import("../data/changes.js").Seen | null>} */
   #seen = Promise.resolve(null);
@@ -48,7 +53,15 @@ export class PlanEditor extends EventTarget {
     this.map = map;
     this.changes = changes;
     this.store = store;
+    this.steps = new DraftSteps(changes.history, t("zone.not_saved"), {
+      get: () => this.#laid(),
+      put: (/** @type {Pick<Draft, "placement" | "points">} */ laid) => this.#takeBack(laid),
+    });
     store.addEventListener("change", () => this.#takePlans());
+  }
+
+  get isUnsaved() {
+    return this.draft !== null && this.#isDirty;
   }
 
   open() {
@@ -73,14 +86,14 @@ export class PlanEditor extends EventTarget {
   /** Upload a file as a new plan. Return what a person should know about its placement. Throws Error when it is refused.
    * @param {File} file @param {Record<string, string>} query */
   async add(file, query) {
-    const { image, placement, note } = await this.store.upload(file, query);
-    const name = file.name.replace(/\.[^.]*$/, "").slice(0, 64);
+    const { image, placement, note, note_phrase } = await this.store.upload(file, query);
+    const name = newName(file.name.replace(/\.[^.]*$/, ""), this.store.plans);
     const id = newId(name || "plan", /** @type {any} */ (this.store.plans));
-    const plan = { id, name, image, placement: placement ?? this.#centred(image) };
-    if (!(await this.changes.create(t("plans.added", { plan: name }), pathOf(id), plan))) return note;
+    const plan = { id, name, image, placement: placement ?? inMiddleOf(this.map.view, image) };
+    if (!(await this.changes.create(t("plans.added", { plan: name }), pathOf(id), plan))) return said(note, note_phrase);
     await this.store.refresh();
     this.select(id);
-    return note;
+    return said(note, note_phrase);
   }
 
   /** @param {Partial<Draft>} values */
@@ -91,23 +104,39 @@ export class PlanEditor extends EventTarget {
     this.#changed();
   }
 
+  #laid() {
+    const { placement, points } = /** @type {Draft} */ (this.draft);
+    return { placement, points };
+  }
+
+  /** @param {Pick<Draft, "placement" | "points">} laid */
+  #takeBack(laid) {
+    if (this.mode === "place") this.mode = ""; // the point may be gone
+    this.change(laid);
+  }
+
   /** @param {Mode} mode */
   setMode(mode) {
     const isFull = mode === "pick" && this.draft?.points.length === MAX_POINTS;
     this.mode = mode === this.mode || isFull ? "" : mode;
+    this.isBeside = false;
     if (this.mode === "pick" && this.draft) this.#reveal(this.draft);
     this.#changed();
   }
 
   /** Say where a point is. @param {number} index @param {number | null} x @param {number | null} y */
   placePoint(index, x, y) {
-    if (this.draft) this.#align(this.draft.points.with(index, { ...this.draft.points[index], x, y }));
+    if (!this.draft) return;
+    this.steps.keep(t("plans.point_placed"), `place ${index}`);
+    this.#align(this.draft.points.with(index, { ...this.draft.points[index], x, y }));
   }
 
   /** @param {number} index */
   removePoint(index) {
     this.mode = "";
-    if (this.draft) this.#align(this.draft.points.toSpliced(index, 1));
+    if (!this.draft) return;
+    this.steps.keep(t("plans.point_removed"));
+    this.#align(this.draft.points.toSpliced(index, 1));
   }
 
   /** @param {number | null} distance_m */
@@ -116,7 +145,11 @@ export class PlanEditor extends EventTarget {
     if (this.draft) this.#align(this.draft.points);
   }
 
-  async save() {
+  save() {
+    return this.saving.until(this.#save());
+  }
+
+  async #save() {
     const { draft } = this;
     const seen = await this.#seen;
     if (!draft || !seen) return;
@@ -130,8 +163,7 @@ export class PlanEditor extends EventTarget {
     const { draft } = this;
     const plan = this.store.find(draft?.id ?? "");
     if (!draft || !plan) return;
-    const restore = { path: pathOf(plan.id), value: plan, conditions: { "if-none-match": "*" } };
-    if (await this.changes.remove(t("plans.deleted", { plan: plan.name || plan.id }), restore.path, restore)) this.discard();
+    if (await this.changes.remove(t("plans.deleted", { plan: plan.name || plan.id }), pathOf(plan.id))) this.discard();
     await this.store.refresh();
   }
 
@@ -153,15 +185,19 @@ export class PlanEditor extends EventTarget {
       this.placePoint(this.#point, ...this.#snapped(x, y, px, py));
       return true;
     }
-    if (!isInside(draft.image, pixel)) return false; // so that the map can be moved beside the plan
-    this.#grab = { dx: draft.placement.x - x, dy: draft.placement.y - y };
+    if (!isInside(draft.image, pixel)) {
+      this.isBeside = mode === "pick";
+      this.#changed();
+      return false; // so that the map can be moved beside the plan
+    }
+    this.#grab = { dx: draft.placement.x - x, dy: draft.placement.y - y }; // a new one: one drag is one step
     if (mode === "pick") this.#pick(pixel);
     return true;
   }
 
   /** @param {import("../setup/gestures.js").Spot} at */
   drag({ x, y }) {
-    if (this.mode === "move") this.#moveTo(x + this.#grab.dx, y + this.#grab.dy);
+    if (this.mode === "move") this.#moveTo(x + this.#grab.dx, y + this.#grab.dy, this.#grab);
   }
 
   drop() {}
@@ -172,20 +208,24 @@ export class PlanEditor extends EventTarget {
     if (!this.draft || this.mode !== "move" || !direction) return false;
     const step = event.shiftKey ? LARGE_STEP_M : STEP_M;
     const { x, y } = this.draft.placement;
-    this.#moveTo(x + step * direction[0], y + step * direction[1]);
+    this.#moveTo(x + step * direction[0], y + step * direction[1], "arrows");
     return true;
   }
 
-  /** @param {number} x @param {number} y */
-  #moveTo(x, y) {
-    if (this.draft) this.change({ placement: { ...this.draft.placement, x: toCentimetre(x), y: toCentimetre(y) } });
+  /** @param {number} x @param {number} y @param {object | string} gesture */
+  #moveTo(x, y, gesture) {
+    if (!this.draft) return;
+    this.steps.keep(t("plans.moved"), gesture);
+    this.change({ placement: { ...this.draft.placement, x: toCentimetre(x), y: toCentimetre(y) } });
   }
 
   /** @param {import("./transform.js").Pixel} pixel */
   #pick(pixel) {
     const points = [.../** @type {Draft} */ (this.draft).points, { ...pixel, x: null, y: null }];
+    this.steps.keep(t("plans.point_added"));
     this.#point = points.length - 1;
     this.mode = "place";
+    this.isBeside = false;
     this.#align(points);
   }
 
@@ -203,13 +243,6 @@ export class PlanEditor extends EventTarget {
     this.change({ points, placement: aligned(placement, image, points, this.distance_m) });
   }
 
-  /** Return a placement in the middle of the map. @param {import("./plan_store.js").PlanImage} image */
-  #centred({ width_px, height_px }) {
-    const { x, y, scale, width, height } = this.map.view;
-    const m_per_px = (NEW_SHARE / scale) * Math.min(width / width_px, height / height_px);
-    return { x: toCentimetre(x), y: toCentimetre(y), rotation_rad: 0, m_per_px };
-  }
-
   /** Bring the whole plan into view, unless it is. @param {Plan} plan */
   #reveal({ placement, image }) {
     const { map } = this;
@@ -223,6 +256,7 @@ export class PlanEditor extends EventTarget {
 
   /** @param {Plan} plan @param {Promise<import("../data/changes.js").Seen | null>} [seen] as read from the service */
   #edit(plan, seen = this.changes.read(pathOf(plan.id)).catch(() => null)) {
+    this.steps.forget();
     this.draft = { ...plan, points: [...plan.control_points] };
     this.#isDirty = false;
     this.revision++;
@@ -249,6 +283,7 @@ export class PlanEditor extends EventTarget {
 
   /** Forget what is not saved. */
   discard() {
+    this.steps.forget();
     this.draft = null;
     this.#isDirty = false;
     this.mode = "";

@@ -15,8 +15,9 @@ export class PlanPanel {
   #filled = 0;
 
   /** @param {HTMLElement} panel @param {HTMLElement} toggle @param {HTMLDialogElement} dialog
-   * @param {import("./plan_editor.js").PlanEditor} editor @param {import("../data/changes.js").Changes} changes */
-  constructor(panel, toggle, dialog, editor, changes) {
+   * @param {import("./plan_editor.js").PlanEditor} editor @param {import("../data/changes.js").Changes} changes
+   * @param {import("../page/one_panel.js").Panels} panels */
+  constructor(panel, toggle, dialog, editor, changes, panels) {
     this.panel = panel;
     this.toggle = toggle;
     this.dialog = dialog;
@@ -26,8 +27,9 @@ export class PlanPanel {
     this.upload = /** @type {HTMLFormElement} */ (this.#part("upload"));
     this.form = /** @type {HTMLFormElement} */ (this.#part("form"));
     this.points = new PlanPoints(this.#part("points"), editor);
-    toggle.addEventListener("click", () => (editor.isOpen ? editor.close() : editor.open()));
-    this.#part("close").addEventListener("click", () => editor.close());
+    panels.add("plans", { isOpen: () => editor.isOpen, isUnsaved: () => editor.isUnsaved, saving: () => editor.saving.now, leave: () => editor.close() });
+    toggle.addEventListener("click", () => panels.toggle("plans", () => editor.open()));
+    this.#part("close").addEventListener("click", () => panels.close("plans"));
     this.#part("delete").addEventListener("click", () => this.#delete());
     this.#part("move").addEventListener("click", () => editor.setMode("move"));
     this.#part("pick").addEventListener("click", () => editor.setMode("pick"));
@@ -44,7 +46,7 @@ export class PlanPanel {
     });
     this.list.addEventListener("click", (event) => {
       const id = /** @type {HTMLElement} */ (event.target).closest("button")?.dataset.plan;
-      if (id !== undefined) editor.select(id);
+      if (id !== undefined && id !== editor.draft?.id) panels.open("plans", () => editor.select(id));
     });
     for (const [source, name] of /** @type {[EventTarget, string][]} */ ([[editor, "change"], [changes, "access"]])) source.addEventListener(name, () => this.#update());
     this.#update();
@@ -70,7 +72,7 @@ export class PlanPanel {
     this.upload.hidden = editor.draft !== null;
     this.#part("delete").hidden = !changes.mayDelete;
     for (const mode of /** @type {const} */ (["move", "pick"])) this.#part(mode).setAttribute("aria-pressed", String(editor.mode === mode));
-    write(this.#part("how"), editor.mode === "" ? "" : t(`plans.how_${editor.mode}`));
+    write(this.#part("how"), editor.mode === "" ? "" : t(editor.isBeside ? "plans.how_beside" : `plans.how_${editor.mode}`));
     if (!editor.isOpen) this.#say("");
     if (editor.draft) this.#fillForm(editor.draft);
     this.points.update();
@@ -171,7 +173,7 @@ export class PlanPanel {
       this.upload.reset();
       this.#chosen();
     } catch (error) {
-      this.#say(refusal(error instanceof Error ? error.message : String(error)));
+      this.#say(refusal(error));
     }
     write(this.#part("busy"), "");
   }

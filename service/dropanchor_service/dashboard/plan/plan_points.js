@@ -30,9 +30,9 @@ export class PlanPoints {
     this.#shown = shown;
     this.distance.hidden = points.length < 2 || points.filter(isPlaced).length > 1;
     const off = residuals(draft.placement, draft.image, points);
-    points.forEach((point, i) => this.#fill(i, point, off[i]));
     const known = off.filter((one) => one !== null);
     const isTelling = known.length >= RESIDUALS_FROM || known.some((one) => one > 0.01);
+    points.forEach((point, i) => this.#fill(i, point, isTelling ? off[i] : null));
     this.residual.textContent = isTelling ? t("plans.off_at_most", { distance: length(Math.max(...known)) }) : "";
   }
 
@@ -77,7 +77,7 @@ export class PlanPoints {
     return select;
   }
 
-  /** @param {number} index @param {import("./transform.js").Point} point @param {number | null} off_m */
+  /** @param {number} index @param {import("./transform.js").Point} point @param {number | null} off_m null: it says nothing */
   #fill(index, point, off_m) {
     const [, x, y, anchor, off] = this.list.children[index].children;
     for (const [field, value] of /** @type {[HTMLInputElement, number | null][]} */ ([[x, point.x], [y, point.y]])) {

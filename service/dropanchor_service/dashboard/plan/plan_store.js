@@ -16,7 +16,7 @@ import { api, getJson } from "../data/connection.js";
  * @property {Floor | null} floor
  * @property {import("./transform.js").PlacedPoint[]} control_points
  */
-/** @typedef {{image: PlanImage, pages: number, placement: import("./transform.js").Placement | null, note: string}} Uploaded */
+/** @typedef {{image: PlanImage, pages: number, placement: import("./transform.js").Placement | null, note: string, note_phrase: import("../i18n/said.js").Phrase | null}} Uploaded */
 
 /** Event: "change". */
 export class PlanStore extends EventTarget {

@@ -16,23 +16,20 @@ export class Plans {
   store = new PlanStore();
   images = new PlanImages();
 
-  /** @param {import("../map/map.js").LiveMap} map @param {import("../data/roster.js").Roster} roster
-   * @param {import("../page/choice.js").Choice} choice @param {import("../data/connection.js").Connection} connection
-   * @param {import("../setup/setup.js").Setup} setup */
-  constructor(map, roster, choice, connection, setup) {
+  /** @param {import("../map/map.js").LiveMap} map @param {import("../data/connection.js").Connection} connection
+   * @param {import("../data/changes.js").Changes} changes @param {import("../page/one_panel.js").Panels} panels */
+  constructor(map, connection, changes, panels) {
     this.map = map;
     this.floors = new Floors(byId("floor"));
-    this.editor = new PlanEditor(map, setup.changes, this.store);
-    new PlanPanel(byId("plans"), byId("edit-plans"), byId("confirm"), this.editor, setup.changes);
+    this.editor = new PlanEditor(map, changes, this.store);
+    new PlanPanel(byId("plans"), byId("edit-plans"), byId("confirm"), this.editor, changes, panels);
     this.#drawOn(map);
-    map.isElsewhere = (row) => this.floors.chosen !== null && isElsewhere(this.floors.all, this.floors.chosen, roster.height(map.fleet.names[row]));
+    const { number, value } = map.fleet;
+    map.isElsewhere = (row) => isElsewhere(this.floors.chosen, value.floor[row], number.floor_probability[row]);
     giveTo(map, [this.editor]);
     for (const source of [this.images, this.floors]) source.addEventListener("change", () => map.redraw());
     this.images.addEventListener("change", () => this.#sayFaults());
     this.store.addEventListener("change", () => this.#takePlans());
-    this.editor.addEventListener("change", () => this.#keepApart(setup, choice));
-    for (const other of [choice, setup.anchors]) other.addEventListener("change", () => this.#giveWay(setup, choice));
-    byId("history").addEventListener("click", () => this.editor.close());
     connection.addEventListener("site", (event) => (this.editor.georeference = /** @type {CustomEvent} */ (event).detail.georeference));
     connection.addEventListener("settings", () => this.store.refresh());
     connection.addEventListener("status", () => connection.status === "live" && this.store.refresh());
@@ -71,18 +68,5 @@ export class Plans {
     const notice = byId("plan-faults");
     notice.textContent = lines.filter(Boolean).join(" ");
     notice.hidden = notice.textContent === "";
-  }
-
-  /** While plans are edited, no tag is selected and no anchor is edited.
-   * @param {import("../setup/setup.js").Setup} setup @param {import("../page/choice.js").Choice} choice */
-  #keepApart(setup, choice) {
-    if (!this.editor.isOpen) return;
-    if (setup.anchors.isOpen) setup.anchors.close();
-    choice.select(null);
-  }
-
-  /** @param {import("../setup/setup.js").Setup} setup @param {import("../page/choice.js").Choice} choice */
-  #giveWay(setup, choice) {
-    if (this.editor.isOpen && (choice.selected !== null || setup.anchors.isOpen)) this.editor.close();
   }
 }

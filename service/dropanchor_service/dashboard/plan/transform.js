@@ -1,5 +1,10 @@
 /** Where the pixels of a plan lie in the site frame: a similarity, which moves, turns and scales. */
 
+import { toCentimetre } from "../setup/gestures.js";
+
+/** Share of the map that a new plan takes. */
+const NEW_SHARE = 0.6;
+
 /** @typedef {{x: number, y: number, rotation_rad: number, m_per_px: number}} Placement of the centre of the image */
 /** @typedef {{width_px: number, height_px: number}} Size */
 /** @typedef {{column_px: number, row_px: number}} Pixel */
@@ -25,6 +30,12 @@ export function pixelOf(placement, { width_px, height_px }, x, y) {
 
 /** @param {Size} size @param {Pixel} pixel */
 export const isInside = (size, { column_px, row_px }) => column_px >= 0 && column_px <= size.width_px && row_px >= 0 && row_px <= size.height_px;
+
+/** Return the placement of a new plan. @param {import("../map/view.js").View} view @param {Size} size @returns {Placement} */
+export function inMiddleOf({ x, y, scale, width, height }, { width_px, height_px }) {
+  const m_per_px = (NEW_SHARE / scale) * Math.min(width / width_px, height / height_px);
+  return { x: toCentimetre(x), y: toCentimetre(y), rotation_rad: 0, m_per_px };
+}
 
 /** Return the corners, from the first pixel clockwise. @param {Placement} placement @param {Size} size @returns {[number, number][]} */
 export function cornersOf(placement, size) {

@@ -10,17 +10,21 @@ const FIELDS = /** @type {const} */ (["x", "y", "z"]);
 
 export class AnchorPanel {
   /** @param {HTMLElement} panel @param {HTMLButtonElement} toggle @param {HTMLDialogElement} dialog
-   * @param {import("./anchors.js").AnchorEditor} editor @param {import("../data/changes.js").Changes} changes */
-  constructor(panel, toggle, dialog, editor, changes) {
+   * @param {import("./anchors.js").AnchorEditor} editor @param {import("../data/changes.js").Changes} changes
+   * @param {import("../page/one_panel.js").Panels} panels */
+  constructor(panel, toggle, dialog, editor, changes, panels) {
     this.panel = panel;
     this.toggle = toggle;
     this.editor = editor;
     this.changes = changes;
     this.dialog = dialog;
+    this.panels = panels;
     this.list = this.#part("list");
     this.form = /** @type {HTMLFormElement} */ (this.#part("form"));
-    toggle.addEventListener("click", () => (editor.isOpen ? editor.close() : editor.open()));
-    this.#part("close").addEventListener("click", () => editor.close());
+    panels.add("anchors", { isOpen: () => editor.isOpen, isUnsaved: () => editor.isUnsaved, leave: () => editor.close() });
+    editor.choose = (id) => panels.open("anchors", () => editor.select(id));
+    toggle.addEventListener("click", () => panels.toggle("anchors", () => editor.open()));
+    this.#part("close").addEventListener("click", () => panels.close("anchors"));
     this.#part("new").addEventListener("click", () => this.add());
     this.#part("delete").addEventListener("click", () => this.#delete());
     this.form.addEventListener("input", () => this.#typed());
@@ -34,16 +38,18 @@ export class AnchorPanel {
     });
     this.list.addEventListener("click", (event) => {
       const id = /** @type {HTMLElement} */ (event.target).closest("button")?.dataset.anchor;
-      if (id !== undefined) editor.select(id);
+      if (id !== undefined && id !== editor.draft?.id) editor.choose(id);
     });
     for (const source of [editor, changes]) for (const name of ["change", "access"]) source.addEventListener(name, () => this.#update());
     this.#update();
   }
 
-  /** Begin a new anchor. @param {string} [id] */
-  add(id) {
-    this.editor.add(id);
-    this.#field(id ? "x" : "id").select();
+  /** Begin a new anchor. @param {string} [id] @param {{x: number, y: number}} [place] m */
+  add(id, place) {
+    this.panels.open("anchors", () => {
+      this.editor.add(id, place);
+      this.#field(id ? "x" : "id").select();
+    });
   }
 
   /** @param {string} name */

@@ -26,7 +26,10 @@ export class AnchorEditor extends EventTarget {
   anchors = [];
   /** The anchor that is being edited. @type {Anchor | null} */
   draft = null;
+  /** Choose an anchor that a person pressed on the map. */
+  choose = (/** @type {string} */ id) => this.select(id);
   #isDirty = false;
+  #isSaving = false;
   /** @type {Promise<Seen | null>} */
   #seen = Promise.resolve(null);
   /** 0: nothing waits to be saved. */
@@ -52,6 +55,11 @@ export class AnchorEditor extends EventTarget {
     this.#changed();
   }
 
+  /** Whether something would be lost: what arrow keys and drags change is saved by itself. */
+  get isUnsaved() {
+    return this.#isDirty && !this.#isSaving && this.#timer === 0;
+  }
+
   open() {
     this.isOpen = true;
     this.#changed();
@@ -74,11 +82,12 @@ export class AnchorEditor extends EventTarget {
     this.#changed();
   }
 
-  /** Begin a new anchor at the centre of the map. @param {string} [id] */
-  add(id = "") {
+  /** Begin a new anchor. @param {string} [id] @param {{x: number, y: number}} [place] m, by default the centre of the map */
+  add(id = "", place = this.map.view) {
+    if (this.#timer) this.save();
     this.#discard();
     this.isNew = this.isOpen = true;
-    this.draft = { id, x: toCentimetre(this.map.view.x), y: toCentimetre(this.map.view.y), z: 0 };
+    this.draft = { id, x: toCentimetre(place.x), y: toCentimetre(place.y), z: 0 };
     this.#changed();
   }
 
@@ -94,11 +103,13 @@ export class AnchorEditor extends EventTarget {
     this.#stopTimer();
     const { draft, isNew } = this;
     if (!draft || (!isNew && !this.#isDirty)) return;
+    this.#isSaving = true;
     const seen = await this.#seen;
     const take = () => this.#takeNewer(draft.id);
     const done = isNew
       ? await this.changes.create(t("anchors.added", { id: draft.id }), pathOf(draft.id), draft)
       : seen !== null && (await this.changes.edit(t("anchors.moved", { id: draft.id }), pathOf(draft.id), draft, seen, take));
+    this.#isSaving = false;
     if (!done || this.draft !== draft) return;
     this.anchors = [...this.anchors.filter(({ id }) => id !== draft.id), draft];
     this.#edit(draft);
@@ -108,9 +119,7 @@ export class AnchorEditor extends EventTarget {
   async remove() {
     const { draft } = this;
     if (!draft) return;
-    const restore = { path: pathOf(draft.id), value: draft, conditions: { "if-none-match": "*" } };
-    const known = this.anchors.find(({ id }) => id === draft.id) ?? draft;
-    if (!(await this.changes.remove(t("anchors.deleted", { id: draft.id }), restore.path, { ...restore, value: known }))) return;
+    if (!(await this.changes.remove(t("anchors.deleted", { id: draft.id }), pathOf(draft.id)))) return;
     this.anchors = this.anchors.filter(({ id }) => id !== draft.id);
     this.cancel();
   }
@@ -129,7 +138,8 @@ export class AnchorEditor extends EventTarget {
     const { view } = this.map;
     const near = this.map.anchors.find((anchor) => Math.hypot(view.screenX(anchor.x) - px, view.screenY(anchor.y) - py) < REACH_PX);
     if (near) {
-      if (near.id !== this.draft?.id) this.select(near.id);
+      if (near.id !== this.draft?.id) this.choose(near.id);
+      if (near.id !== this.draft?.id) return false;
       this.#grab = { px, py, dx: near.x - x, dy: near.y - y, moves: false };
       return true;
     }

@@ -10,6 +10,7 @@ import { GroupFilter } from "./group_filter.js";
 import { Outcome } from "./outcome.js";
 import { StartEditor } from "./start.js";
 import { TagPanel } from "./tag_panel.js";
+import { installUndoKeys } from "./undo_keys.js";
 
 /** @template {HTMLElement} T @param {string} id @returns {T} */
 const byId = (id) => /** @type {T} */ (document.getElementById(id));
@@ -20,14 +21,14 @@ export class Setup {
 
   /** @param {import("../map/map.js").LiveMap} map @param {import("../data/fleet.js").Fleet} fleet
    * @param {import("../data/roster.js").Roster} roster @param {import("../page/choice.js").Choice} choice
-   * @param {import("../data/connection.js").Connection} connection */
-  constructor(map, fleet, roster, choice, connection) {
+   * @param {import("../data/connection.js").Connection} connection @param {import("../page/one_panel.js").Panels} panels */
+  constructor(map, fleet, roster, choice, connection, panels) {
     const { changes, start } = this;
     this.anchors = new AnchorEditor(map, changes);
     const dialog = /** @type {HTMLDialogElement} */ (byId("confirm"));
-    const panel = new AnchorPanel(byId("setup"), byId("edit"), dialog, this.anchors, changes);
-    this.tagPanel = new TagPanel(byId("detail"), dialog, fleet, choice, changes, start);
-    this.addAnchor = new AddAnchor(byId("detail"), roster, choice, changes, (id) => panel.add(id));
+    this.anchorPanel = new AnchorPanel(byId("setup"), byId("edit"), dialog, this.anchors, changes, panels);
+    this.tagPanel = new TagPanel(byId("detail"), dialog, fleet, choice, changes, start, panels);
+    this.addAnchor = new AddAnchor(byId("detail"), roster, choice, changes, (id) => this.anchorPanel.add(id));
     this.groups = new GroupFilter(/** @type {HTMLSelectElement} */ (byId("group")), fleet, choice);
     new Outcome(byId("outcome"), changes);
     map.overlays.push(({ ctx, view, palette }) => {
@@ -36,12 +37,13 @@ export class Setup {
     });
     giveTo(map, [start, this.anchors]);
     start.addEventListener("change", () => map.redraw());
-    this.anchors.addEventListener("change", () => this.anchors.isOpen && choice.select(null));
-    choice.addEventListener("change", () => choice.selected !== null && this.anchors.isOpen && this.anchors.close());
     for (const name of ["done", "conflict"]) changes.addEventListener(name, () => connection.refresh());
-    byId("history").addEventListener("click", () => this.#leave());
     connection.addEventListener("status", () => connection.status === "live" && changes.requestAccess());
-    document.addEventListener("keydown", (event) => this.#undoOn(event));
+    installUndoKeys(changes);
+    changes.history.addEventListener("undone", (event) => {
+      const { started } = /** @type {CustomEvent} */ (event).detail;
+      if (started) map.trails.forget(started.tag, started.since_ms);
+    });
   }
 
   /** Take the site as it is now. @param {{anchors: import("../map/draw_site.js").Anchor[], georeference: {rotation_rad: number} | null}} site */
@@ -53,19 +55,5 @@ export class Setup {
   update() {
     this.addAnchor.update();
     this.groups.update();
-  }
-
-  /** Put the tools away, because the past cannot be set up. */
-  #leave() {
-    this.anchors.close();
-    this.start.cancel();
-  }
-
-  /** @param {KeyboardEvent} event */
-  #undoOn(event) {
-    const isTyping = event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement;
-    if (isTyping || event.key !== "z" || !(event.ctrlKey || event.metaKey)) return;
-    event.preventDefault();
-    this.changes.undo();
   }
 }

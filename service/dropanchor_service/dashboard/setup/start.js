@@ -13,11 +13,14 @@ export class StartEditor extends EventTarget {
   rotation_rad = 0;
   /** The pose on the map; null: the tool is not in use. @type {Start | null} */
   draft = null;
+  /** Whether a person has changed the pose. */
+  isUnsaved = false;
   #pressed = { px: 0, py: 0 };
 
   /** @param {Start} draft */
   begin(draft) {
     this.#set({ ...draft, x: toCentimetre(draft.x), y: toCentimetre(draft.y) });
+    this.isUnsaved = false;
   }
 
   /** The heading in degrees clockwise from north; null: unknown. */
@@ -60,6 +63,7 @@ export class StartEditor extends EventTarget {
   /** @param {Start | null} draft */
   #set(draft) {
     this.draft = draft;
+    this.isUnsaved = draft !== null;
     this.dispatchEvent(new Event("change"));
   }
 }

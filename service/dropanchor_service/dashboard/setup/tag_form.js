@@ -4,6 +4,7 @@ import { readMeasure, writeMeasure } from "../data/units.js";
 import { t } from "../i18n/language.js";
 
 const DEGREES = 180 / Math.PI;
+const FIELDS = ["name", "group", "colour", "motion", "mount", "height"];
 
 /** Colours that differ for people with any colour vision, and that show on both themes. */
 const COLOURS = [
@@ -34,9 +35,17 @@ export function fillForm(form, settings, groups) {
   form.querySelector("datalist")?.replaceChildren(...[...groups].sort().map((group) => new Option(group)));
 }
 
+/** @param {HTMLInputElement} input */
+const isTyped = ({ value, dataset }) => value !== dataset.shown;
+
+/** Return what puts back what a person has typed, after the form was filled anew. @param {HTMLFormElement} form */
+export function typedIn(form) {
+  const typed = FIELDS.map((name) => field(form, name)).filter(isTyped).map((input) => ({ input, value: input.value }));
+  return () => typed.forEach(({ input, value }) => (input.value = value));
+}
+
 /** Return the settings that a person has changed. @param {HTMLFormElement} form */
 export function patchOf(form) {
-  const isChanged = (/** @type {string} */ name) => field(form, name).value !== field(form, name).dataset.shown;
   const angle = numberOf(field(form, "mount"));
   const values = [
     ["name", "name", field(form, "name").value.trim()],
@@ -46,5 +55,5 @@ export function patchOf(form) {
     ["mount", "mount_angle_rad", angle === null ? null : angle / DEGREES],
     ["height", "height_m", readMeasure(field(form, "height")) ?? 0],
   ];
-  return Object.fromEntries(values.filter(([name]) => isChanged(String(name))).map(([, key, value]) => [key, value]));
+  return Object.fromEntries(values.filter(([name]) => isTyped(field(form, String(name)))).map(([, key, value]) => [key, value]));
 }

@@ -1,8 +1,9 @@
 /** The settings of the selected tag: name, colour, group, motion, mounting angle, height, start; and its deletion. */
 
 import { readMeasure, writeMeasure } from "../data/units.js";
+import { Saving } from "../data/saving.js";
 import { confirmed } from "./confirm.js";
-import { numberOf, patchOf, fillForm } from "./tag_form.js";
+import { fillForm, numberOf, patchOf, typedIn } from "./tag_form.js";
 import { t } from "../i18n/language.js";
 
 /** @typedef {import("../data/changes.js").Seen} Seen */
@@ -12,11 +13,12 @@ export class TagPanel {
   #tag = "";
   /** @type {Seen | null} */
   #seen = null;
+  #saving = new Saving();
 
   /** @param {HTMLElement} panel @param {HTMLDialogElement} dialog @param {import("../data/fleet.js").Fleet} fleet
    * @param {import("../page/choice.js").Choice} choice @param {import("../data/changes.js").Changes} changes
-   * @param {import("./start.js").StartEditor} start */
-  constructor(panel, dialog, fleet, choice, changes, start) {
+   * @param {import("./start.js").StartEditor} start @param {import("../page/one_panel.js").Panels} panels */
+  constructor(panel, dialog, fleet, choice, changes, start, panels) {
     this.panel = panel;
     this.dialog = dialog;
     this.fleet = fleet;
@@ -26,22 +28,27 @@ export class TagPanel {
     this.box = /** @type {HTMLDetailsElement} */ (this.#part("settings"));
     this.form = /** @type {HTMLFormElement} */ (this.#part("settings-form"));
     this.startForm = /** @type {HTMLFormElement} */ (this.#part("start-form"));
-    this.box.addEventListener("toggle", () => this.#load());
+    panels.add("tag", {
+      isOpen: () => choice.selected !== null, isUnsaved: () => this.#isTyped || start.isUnsaved,
+      saving: () => this.#saving.now, leave: () => choice.select(null),
+    });
+    panels.add("start", { isOpen: () => start.draft !== null, isUnsaved: () => start.isUnsaved, saving: () => this.#saving.now, leave: () => start.cancel() });
+    this.box.addEventListener("toggle", () => this.#seen === null && this.#load());
     this.form.addEventListener("submit", (event) => this.#save(event));
     this.#part("delete-tag").addEventListener("click", () => this.#delete());
-    this.#part("start").addEventListener("click", () => this.#beginStart());
+    this.#part("start").addEventListener("click", () => panels.open("start", () => this.#beginStart()));
     this.startForm.addEventListener("input", () => this.#typedStart());
     this.startForm.addEventListener("submit", (event) => this.#saveStart(event));
     this.startForm.addEventListener("reset", () => start.cancel());
     start.addEventListener("change", () => this.#showStart());
     changes.addEventListener("access", () => this.update());
-    changes.addEventListener("done", () => this.#load());
+    changes.addEventListener("done", (event) => /** @type {CustomEvent} */ (event).detail === this.#path && this.#load(this.#seen !== null && this.#saving.now === null));
     choice.addEventListener("change", () => this.update());
     this.update();
   }
 
   update() {
-    this.box.hidden = !this.changes.mayWrite;
+    this.#part("actions").hidden = !this.changes.mayWrite;
     this.#part("delete-tag").hidden = !this.changes.mayDelete;
     const tag = this.choice.selected ?? "";
     if (tag === this.#tag) return;
@@ -55,12 +62,16 @@ export class TagPanel {
     return /** @type {HTMLElement} */ (this.panel.querySelector(`[data-part="${name}"]`));
   }
 
+  get #isTyped() {
+    return this.#seen !== null && Object.keys(patchOf(this.form)).length > 0;
+  }
+
   get #path() {
     return `tags/${encodeURIComponent(this.#tag)}/settings`;
   }
 
-  /** Request the settings and show them, if the form is open. */
-  async #load() {
+  /** Request the settings and show them, if the form is open. @param {boolean} [keep] what is typed and not saved */
+  async #load(keep = false) {
     const tag = this.#tag;
     this.#seen = null;
     if (!tag || !this.box.open) return;
@@ -68,7 +79,9 @@ export class TagPanel {
       const seen = await this.changes.read(this.#path);
       if (tag !== this.#tag) return;
       this.#seen = seen;
+      const typeAgain = keep ? typedIn(this.form) : () => {};
       fillForm(this.form, seen.value, new Set(this.fleet.groups.filter((group) => group !== "")));
+      typeAgain();
     } catch {
       // A tag that was deleted has no settings. The table drops it with its next update.
     }
@@ -78,24 +91,50 @@ export class TagPanel {
   async #save(event) {
     event.preventDefault();
     if (!this.#seen) return;
-    await this.#edit(t("setup.saved", { tag: this.#tag }), patchOf(this.form));
+    await this.#saving.until(this.#edit(t("setup.saved", { tag: this.#tag }), patchOf(this.form)));
   }
 
-  /** @param {string} what @param {object} patch */
-  async #edit(what, patch) {
+  /** @param {string} what @param {object} patch @param {import("../data/changes.js").More} [more] */
+  async #edit(what, patch, more) {
     const seen = this.#seen ?? (await this.changes.read(this.#path));
-    return this.changes.edit(what, this.#path, patch, seen, () => this.#load());
+    return this.changes.edit(what, this.#path, patch, seen, () => this.#load(), more);
   }
 
   #beginStart() {
-    const { drawnX, drawnY, number } = this.fleet;
+    const { drawnX, drawnY } = this.fleet;
     const row = this.fleet.row(this.#tag);
-    const heading = number.heading_rad[row];
-    const isPlaced = this.fleet.hasPose(row) && !this.fleet.isTurned(row) && !Number.isNaN(drawnX[row]);
-    this.start.begin(isPlaced
-      ? { x: drawnX[row], y: drawnY[row], heading_rad: Number.isNaN(heading) ? null : heading }
-      : { x: 0, y: 0, heading_rad: null });
+    if (this.#isPlaced(row)) this.#beginAt(drawnX[row], drawnY[row]);
+    else this.start.begin({ x: 0, y: 0, heading_rad: null });
     this.#startField("x").select();
+  }
+
+  /** @param {number} row */
+  #isPlaced(row) {
+    return this.fleet.hasPose(row) && !this.fleet.isTurned(row) && !Number.isNaN(this.fleet.drawnX[row]);
+  }
+
+  /** Begin at a place, with the heading that the tag has there. @param {number} x m @param {number} y m */
+  #beginAt(x, y) {
+    const row = this.fleet.row(this.#tag);
+    const heading = this.fleet.number.heading_rad[row];
+    this.start.begin({ x, y, heading_rad: !this.#isPlaced(row) || Number.isNaN(heading) ? null : heading });
+  }
+
+  /** Say that the selected tag is at a place: one more press sets the start. @param {number} x m @param {number} y m */
+  beginStartAt(x, y) {
+    this.box.open = true;
+    this.#beginAt(x, y);
+    const button = /** @type {HTMLElement} */ (this.startForm.querySelector("button"));
+    button.scrollIntoView({ block: "nearest" });
+    button.focus();
+  }
+
+  /** Open the settings of the selected tag. */
+  openSettings() {
+    this.box.open = true;
+    const name = /** @type {HTMLElement} */ (this.form.elements.namedItem("name"));
+    name.scrollIntoView({ block: "nearest" });
+    name.focus();
   }
 
   /** @param {string} name */
@@ -123,17 +162,18 @@ export class TagPanel {
     event.preventDefault();
     const { draft } = this.start;
     if (!draft) return;
-    if (await this.#edit(t("setup.start_set", { tag: this.#tag }), { start: { ...draft, std_m: STD_M } })) this.start.cancel();
+    const started = { tag: this.#tag, since_ms: performance.now() };
+    const what = t("setup.start_set", { tag: this.#tag });
+    if (await this.#saving.until(this.#edit(what, { start: { ...draft, std_m: STD_M } }, { started }))) this.start.cancel();
   }
 
   async #delete() {
     const tag = this.#tag;
     const question = t("setup.delete_question", { tag });
     if (!(await confirmed(this.dialog, question, t("delete")))) return;
-    const path = `tags/${encodeURIComponent(tag)}`;
-    const { value } = await this.changes.read(`${path}/settings`);
+    const path = this.#path;
     this.choice.select(null);
-    const done = await this.changes.remove(t("setup.deleted", { tag }), path, { path: `${path}/settings`, value, conditions: {} });
+    const done = await this.changes.remove(t("setup.deleted", { tag }), path);
     if (!done) this.choice.select(tag);
   }
 }

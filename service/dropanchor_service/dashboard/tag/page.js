@@ -43,7 +43,7 @@ function stateOf({ uplink }) {
 /** The sentences that the person should read now, the most urgent first. @param {ThisTag} tag */
 function* problems(tag) {
   const { uplink, motion, queue } = tag;
-  const problem = said(uplink.problem);
+  const { problem } = uplink;
   if (uplink.status === "refused") yield problem;
   if (uplink.status === "broken") yield t("phone.later", { problem }).trim();
   if (uplink.status === "open" && problem) yield problem;
@@ -68,7 +68,7 @@ function show(tag) {
   write("offset", offset(tag));
   byId("pose").dataset.state = state?.name ?? "initialising";
   write("state", state?.label ?? (uplink.answer === null ? UNKNOWN : t("phone.no_position")));
-  write("hint", (uplink.status === "open" && said(uplink.answer?.hint ?? "")) || state?.meaning || t("phone.motion_alone"));
+  write("hint", (uplink.status === "open" && uplink.answer && said(uplink.answer.hint, uplink.answer.hint_phrase)) || state?.meaning || t("phone.motion_alone"));
   const [first, ...others] = problems(tag);
   byId("problem").hidden = first === undefined;
   write("problem", [first, ...others].join(" "));

@@ -26,7 +26,7 @@ export class ThisTag {
 
   /** @param {string} name @param {string} key empty for a service without keys @param {Store} store */
   constructor(name, key, store) {
-    const url = ingest(`stream?tag=${encodeURIComponent(name)}`);
+    const url = ingest(`stream?${new URLSearchParams({ tag: name, reasons: "code" })}`);
     url.protocol = url.protocol.replace("http", "ws");
     this.name = name;
     this.clock = new Clock();

@@ -2,6 +2,7 @@
 
 import { stamp } from "./packed.js";
 import { t } from "../i18n/language.js";
+import { endOf } from "../i18n/said.js";
 
 const PROTOCOL = "dropanchor.samples";
 const KEY_PROTOCOL = "dropanchor.key.";
@@ -21,12 +22,13 @@ const REFUSED = new Set([4400, 4401, 4403]);
  * @property {number} started_ns
  * @property {string | null} state
  * @property {string} hint
+ * @property {import("../i18n/said.js").Phrase | null} hint_phrase
  */
 
 export class Uplink {
   /** @type {"closed" | "connecting" | "open" | "broken" | "refused"} */
   status = "closed";
-  /** Why the service refused, or did not understand a message; for people. */
+  /** Why the service refused, or did not understand a message, in the language of the page. */
   problem = "";
   /** Samples that the service has answered. */
   sent = 0;
@@ -119,11 +121,11 @@ export class Uplink {
   #ended(code, reason) {
     this.#drop();
     if (REFUSED.has(code)) {
-      this.#refuse(reason);
+      this.#refuse(endOf(reason));
       return;
     }
     this.status = "broken";
-    this.problem = reason;
+    this.problem = endOf(reason);
     this.#timer = setTimeout(() => this.open(), RETRY_MS[Math.min(this.#attempt++, RETRY_MS.length - 1)]);
   }
 

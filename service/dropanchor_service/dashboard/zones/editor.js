@@ -1,15 +1,20 @@
-/** Draw a new zone, or edit one. Nothing changes for others until it is saved. */
+/** Draw a new zone, or edit one. Nothing changes for others until it is saved; each step until then can be undone, too. */
 
-import { ChangedMeanwhileError } from "../data/access.js";
+import { ChangedMeanwhileError, ProblemError } from "../data/access.js";
+import { DraftSteps } from "../data/draft_steps.js";
+import { Saving } from "../data/saving.js";
 import { placeIn, withCorner } from "./shape_edit.js";
+import { zoneChange } from "./words.js";
 import { t } from "../i18n/language.js";
 import { refusalInForm } from "../i18n/said.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone @typedef {import("./zone_store.js").Shape} Shape */
 
 const COLOUR = "#2f6fde";
+/** What others see of a zone that is not saved yet. */
+const NEW = { value: null, etag: "" };
 
-/** Return an id made of the name that no zone has yet. @param {string} name @param {readonly Zone[]} zones */
+/** Return an id made of the name that no zone has yet. @param {string} name @param {readonly {id: string}[]} zones */
 export function newId(name, zones) {
   const base = name.trim().toLowerCase().replace(/[^a-z0-9._-]+/g, "-").replace(/^-+|-+$/g, "").slice(0, 56) || "zone";
   const taken = new Set(zones.map(({ id }) => id));
@@ -25,30 +30,44 @@ export class ZoneEditor extends EventTarget {
   zone = null;
   /** Whether clicks on the map add corners. */
   drawing = false;
+  /** Whether the zone was changed since it was opened. */
+  isUnsaved = false;
+  saving = new Saving();
   /** Why the last attempt to save failed. */
   problem = "";
   /** Where on the map that is. @type {[number, number] | null} */
   problemAt = null;
   /** Whether somebody else has changed the zone. */
   conflict = false;
-  #etag = /** @type {string | null} */ (null);
+  /** The zone as it is for others. @type {import("../data/changes.js").Seen} */
+  #seen = NEW;
+  /** Grows whenever a zone is read. */
+  revision = 0;
 
-  /** @param {import("./zone_store.js").ZoneStore} store */
-  constructor(store) {
+  /** @param {import("./zone_store.js").ZoneStore} store @param {import("../data/changes.js").Changes} changes */
+  constructor(store, changes) {
     super();
     this.store = store;
+    this.changes = changes;
+    this.steps = new DraftSteps(changes.history, t("zone.not_saved"), {
+      get: () => /** @type {Zone} */ (this.zone).shape,
+      put: (/** @type {Shape} */ shape) => this.#takeBack(shape),
+    });
+    for (const name of ["undone", "redone"]) changes.history.addEventListener(name, (event) => this.#follow(/** @type {CustomEvent} */ (event).detail));
   }
 
   get isNew() {
-    return this.#etag === null;
+    return this.#seen.value === null;
   }
 
   /** @param {Shape} shape */
   begin(shape) {
-    this.#etag = null;
+    this.steps.forget();
+    this.#seen = NEW;
     this.drawing = true;
     this.zone = {
-      id: "", name: "", colour: COLOUR, shape, enter: true, exit: true, dwell_s: null, speed_mps: null, delay_s: 1, tags: [], groups: [],
+      id: "", name: "", colour: COLOUR, shape, enter: true, exit: true, dwell_s: null, speed_mps: null, z_min_m: null, z_max_m: null,
+      delay_s: 1, tags: [], groups: [],
     };
     this.#say(null);
   }
@@ -56,9 +75,11 @@ export class ZoneEditor extends EventTarget {
   /** Edit a zone as it is now. @param {string} id */
   async open(id) {
     try {
-      const { item, etag } = await this.store.items.read(id);
-      this.zone = /** @type {Zone} */ (/** @type {unknown} */ (item));
-      this.#etag = etag;
+      const seen = await this.store.items.read(id);
+      this.steps.forget();
+      this.#seen = seen;
+      this.zone = seen.value;
+      this.revision++;
       this.drawing = false;
       this.#say(null);
     } catch (error) {
@@ -70,8 +91,23 @@ export class ZoneEditor extends EventTarget {
   change(values) {
     if (!this.zone) return;
     this.zone = { ...this.zone, ...values };
+    this.isUnsaved = true;
     this.problemAt = null;
     this.#changed();
+  }
+
+  /** Change the shape, so that it can be undone. @param {string} what was done, as a sentence @param {Shape} shape
+   * @param {object | string} [gesture] several changes by one gesture are one step */
+  reshape(what, shape, gesture = {}) {
+    if (!this.zone) return;
+    this.steps.keep(what, gesture);
+    this.change({ shape });
+  }
+
+  /** @param {Shape} shape */
+  #takeBack(shape) {
+    this.drawing ||= this.isNew && shape.type === "polygon" && shape.points.length < 3;
+    this.change({ shape });
   }
 
   stopDrawing() {
@@ -80,6 +116,7 @@ export class ZoneEditor extends EventTarget {
   }
 
   close() {
+    this.steps.forget();
     this.zone = null;
     this.drawing = false;
     this.#say(null);
@@ -89,7 +126,8 @@ export class ZoneEditor extends EventTarget {
   click(x, y) {
     if (!this.zone || !this.drawing) return false;
     const { shape } = this.zone;
-    this.change({ shape: shape.type === "circle" ? { ...shape, x, y } : withCorner(shape, x, y) });
+    if (shape.type === "circle") this.reshape(t("zone.placed"), { ...shape, x, y });
+    else this.reshape(t("zone.corner_added"), withCorner(shape, x, y));
     return true;
   }
 
@@ -99,8 +137,8 @@ export class ZoneEditor extends EventTarget {
     let id = this.zone.id;
     const done = await this.#attempt(async () => {
       const zone = /** @type {Zone} */ (this.zone);
-      if (this.#etag === null) id = await this.#create(zone);
-      else await this.store.items.save(zone, this.#etag);
+      if (this.isNew) id = await this.#create(zone);
+      else await this.#apply(zone);
     });
     return done ? id : null;
   }
@@ -109,7 +147,7 @@ export class ZoneEditor extends EventTarget {
   async #create(zone) {
     const id = newId(zone.name, this.store.zones);
     try {
-      await this.store.items.save({ ...zone, id }, null);
+      await this.#apply({ ...zone, id });
       return id;
     } catch (error) {
       if (!(error instanceof ChangedMeanwhileError)) throw error;
@@ -120,12 +158,34 @@ export class ZoneEditor extends EventTarget {
   }
 
   async remove() {
-    const { id } = /** @type {Zone} */ (this.zone);
-    return this.#attempt(() => this.store.items.remove(id, this.#etag ?? ""));
+    return this.#attempt(() => this.#apply(null));
+  }
+
+  /** @param {Zone | null} zone null: delete it */
+  #apply(zone) {
+    const { id } = zone ?? this.#seen.value;
+    return this.changes.apply(zoneChange(this.#seen.value, zone), this.store.items.path(id), this.#seen, zone);
+  }
+
+  /** Show a change that was undone, unless something else is not saved yet. @param {import("../data/undo.js").Step} step */
+  async #follow({ path }) {
+    const { zone } = this;
+    if (!zone || path !== this.store.items.path(zone.id) || !this.#isUnchanged) return;
+    await this.open(zone.id);
+    if (this.problem !== "") this.close(); // the change was its creation
+  }
+
+  get #isUnchanged() {
+    return JSON.stringify(this.zone) === JSON.stringify(this.#seen.value);
   }
 
   /** @param {() => Promise<void>} send */
-  async #attempt(send) {
+  #attempt(send) {
+    return this.saving.until(this.#send(send));
+  }
+
+  /** @param {() => Promise<void>} send */
+  async #send(send) {
     try {
       await send();
       await this.store.refresh();
@@ -139,9 +199,10 @@ export class ZoneEditor extends EventTarget {
 
   /** @param {unknown} error null: none */
   #say(error) {
+    this.isUnsaved &&= error !== null;
     this.conflict = error instanceof ChangedMeanwhileError;
     this.problem = error === null ? "" : this.conflict ? t("zone.conflict") : refusalInForm(error);
-    this.problemAt = error instanceof Error ? placeIn(error.message) : null;
+    this.problemAt = error instanceof ProblemError ? placeIn(error.problem) : null;
     this.#changed();
   }
 

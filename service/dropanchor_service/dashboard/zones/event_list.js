@@ -1,6 +1,7 @@
 /** The list of the latest events, newest first. A click selects the tag and the zone. */
 
-import { clock, probability, sentence } from "./words.js";
+import { retractedBy } from "./event_log.js";
+import { clock, probability, sentence, why } from "./words.js";
 import { t } from "../i18n/language.js";
 
 /** @typedef {import("./words.js").ServiceEvent} ServiceEvent */
@@ -40,6 +41,14 @@ export class EventList {
     for (const event of [...events].reverse()) {
       if (!this.#lines.has(event.sequence)) this.list.prepend(this.#line(event));
     }
+    const retracted = retractedBy(events);
+    for (const event of events.filter(({ id }) => retracted.has(id))) this.#strike(event, retracted.get(event.id));
+  }
+
+  /** Show that an event is not true. @param {ServiceEvent} event @param {string} [reason] */
+  #strike(event, reason) {
+    const text = this.#lines.get(event.sequence)?.querySelector("span");
+    if (text && !text.querySelector("s")) text.replaceChildren(element("s", sentence(event)), ` ${t("event.retracted", { why: why(reason) })}`);
   }
 
   /** @param {ServiceEvent} event */

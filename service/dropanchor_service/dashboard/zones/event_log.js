@@ -16,6 +16,11 @@ export function newestFirst(added, before) {
   return [...fresh, ...before].slice(0, KEPT);
 }
 
+/** Return why events are not true, by their ids. @param {ServiceEvent[]} events @returns {Map<string, string>} */
+export function retractedBy(events) {
+  return new Map(events.flatMap(({ data }) => (data.retracts ? [[data.retracts, data.reason ?? ""]] : [])));
+}
+
 /** Events: "change", and "event" (detail: ServiceEvent) for each that happens from now on. */
 export class EventLog extends EventTarget {
   /** Newest first. @type {ServiceEvent[]} */

@@ -92,7 +92,7 @@ export class Handles {
     const { view } = this.map;
     this.#grab.moved = true;
     const [x, y] = [view.worldX(event.clientX + this.#grab.dx), view.worldY(event.clientY + this.#grab.dy)];
-    this.#move(this.#cornerOf(number, event.pointerId), x, y);
+    this.#move(this.#cornerOf(number, event.pointerId), x, y, this.#grab);
   }
 
   /** Turn an edge into a corner when it is first dragged. Return the number of the handle that is being dragged.
@@ -100,16 +100,17 @@ export class Handles {
   #cornerOf(number, pointer) {
     const { kind, index, x, y } = this.#handles[number];
     if (kind !== "edge") return number;
-    this.#move(number, x, y);
+    this.#move(number, x, y, this.#grab);
     this.#buttons[index + 1].setPointerCapture(pointer);
     this.#buttons[index + 1].focus();
     return index + 1;
   }
 
-  /** @param {number} number @param {number} x @param {number} y */
-  #move(number, x, y) {
+  /** @param {number} number @param {number} x @param {number} y @param {object | string} [gesture] that moves it */
+  #move(number, x, y, gesture) {
     const { zone } = this.editor;
-    if (zone) this.editor.change({ shape: movedTo(zone.shape, this.#handles[number], x, y) });
+    const handle = this.#handles[number];
+    if (zone) this.editor.reshape(t(`handle.moved_${handle.kind}`), movedTo(zone.shape, handle, x, y), gesture);
   }
 
   /** A click on the first corner closes the polygon; one on an edge, also by keyboard, makes a corner there.
@@ -130,7 +131,7 @@ export class Handles {
     const { kind, index, x, y } = this.#handles[number];
     const arrow = ARROWS[/** @type {keyof typeof ARROWS} */ (event.key)];
     const step = event.shiftKey ? LARGE_STEP_M : STEP_M;
-    if (arrow && kind !== "edge") this.#move(number, x + step * arrow[0], y + step * arrow[1]);
+    if (arrow && kind !== "edge") this.#move(number, x + step * arrow[0], y + step * arrow[1], `arrows ${kind} ${index}`);
     else if (kind === "corner" && (event.key === "Delete" || event.key === "Backspace")) this.#remove(index);
     else return;
     event.preventDefault();
@@ -140,7 +141,7 @@ export class Handles {
   #remove(index) {
     const { zone } = this.editor;
     if (!zone) return;
-    this.editor.change({ shape: withoutCorner(zone.shape, index) });
+    this.editor.reshape(t("zone.corner_removed"), withoutCorner(zone.shape, index));
     this.#buttons[Math.max(0, index - 1)]?.focus();
   }
 

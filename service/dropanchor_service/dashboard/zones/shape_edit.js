@@ -49,9 +49,9 @@ export function withoutCorner(shape, index) {
   return shape.type === "polygon" ? { ...shape, points: shape.points.toSpliced(index, 1) } : shape;
 }
 
-/** Return the place that a refusal names, such as "… near (1.5, 2): …"; null: it names none.
- * @param {string} sentence @returns {[number, number] | null} */
-export function placeIn(sentence) {
-  const found = /near \((-?[\d.e+-]+), (-?[\d.e+-]+)\)/.exec(sentence);
-  return found ? [Number(found[1]), Number(found[2])] : null;
+/** Return the place that a refusal names; null: it names none.
+ * @param {import("../i18n/said.js").Problem} problem @returns {[number, number] | null} */
+export function placeIn({ detail_phrase }) {
+  const [x, y] = detail_phrase?.values["what.place"]?.split(", ").map(Number) ?? [];
+  return Number.isFinite(x) && Number.isFinite(y) ? [x, y] : null;
 }

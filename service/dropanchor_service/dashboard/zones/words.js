@@ -1,7 +1,9 @@
-/** Events in words, and times for people. */
+/** Events and changes of zones in words, and times for people. */
 
 import { age, fixed, length, percent, speed } from "../data/format.js";
 import { has, t, timeText } from "../i18n/language.js";
+
+/** @typedef {import("./zone_store.js").Zone} Zone @typedef {import("./zone_store.js").Shape} Shape */
 
 /**
  * An event of the service: a CloudEvent.
@@ -13,7 +15,8 @@ import { has, t, timeText } from "../i18n/language.js";
  * @property {string} sequence
  * @property {{t_ns: number, since_ns: number, zone: string | null, rule: string | null, name: string,
  *   probability: number | null, other_tag: string | null, distance_m: number | null, speed_mps: number | null,
- *   battery_fraction: number | null}} data
+ *   battery_fraction: number | null, retracts?: string | null, retracted_type?: string | null,
+ *   reason?: string | null}} data
  */
 
 /** Return what happened, such as `cart-3 entered Yard`. @param {ServiceEvent} event */
@@ -23,9 +26,12 @@ export function sentence({ type, subject, data }) {
   return t(key, {
     tag: subject, place: data.name || data.zone || data.rule || "", other: data.other_tag ?? "",
     time: age((data.t_ns - data.since_ns) / 1e9), speed: speed(data.speed_mps, 1), distance: length(data.distance_m, 1),
-    battery: percent(data.battery_fraction),
+    battery: percent(data.battery_fraction), why: why(data.reason),
   });
 }
+
+/** Return why an event is not true, in words. @param {string | null} [reason] */
+export const why = (reason) => (reason && has(`event.why.${reason}`) ? t(`event.why.${reason}`) : reason ?? "");
 
 /** Return the probability of an event, such as `P 0.96`; empty where it has none. It is never rounded up to 1.
  * @param {ServiceEvent} event */
@@ -40,3 +46,18 @@ export function clock({ time }, now = new Date()) {
   const isToday = at.toDateString() === now.toDateString();
   return timeText(at, { ...(isToday ? {} : { dateStyle: "medium" }), timeStyle: "medium" });
 }
+
+/** Return what a change did to a zone, as a sentence. @param {Zone | null} before null: it is new @param {Zone | null} after null: it is deleted */
+export function zoneChange(before, after) {
+  const { name, id } = /** @type {Zone} */ (after ?? before);
+  const words = { zone: name || id, before: before?.name || id };
+  if (before === null) return t("zone.added", words);
+  if (after === null) return t("zone.deleted", words);
+  const changed = Object.keys(after).filter((key) => JSON.stringify(after[/** @type {keyof Zone} */ (key)]) !== JSON.stringify(before[/** @type {keyof Zone} */ (key)]));
+  if (changed.join() === "name") return t("zone.renamed", words);
+  if (changed.join() === "shape") return t(isMoved(before.shape, after.shape) ? "zone.moved" : "zone.reshaped", words);
+  return t("zone.changed", words);
+}
+
+/** Return whether a shape is the same elsewhere. @param {Shape} before @param {Shape} after */
+const isMoved = (before, after) => before.type === "circle" && after.type === "circle" && before.radius_m === after.radius_m;

@@ -5,8 +5,12 @@ import { readMeasure, writeMeasure } from "../data/units.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone */
 
+const MEASURES = /** @type {const} */ (["speed_mps", "z_min_m", "z_max_m"]);
+
 export class ZoneForm {
   #shown = "";
+  /** Whether the zone has just been read. */
+  #isFresh = false;
 
   /** @param {HTMLFormElement} form @param {import("./editor.js").ZoneEditor} editor @param {() => void} addCorner */
   constructor(form, editor, addCorner) {
@@ -27,16 +31,17 @@ export class ZoneForm {
   }
 
   update() {
-    const { zone, problem, conflict, isNew } = this.editor;
+    const { zone, problem, conflict, isNew, revision } = this.editor;
     this.form.hidden = zone === null;
     const isNews = problem !== "" && problem !== this.#part("problem").textContent;
     put(this.#part("problem"), problem);
     if (isNews) this.#part("problem").scrollIntoView({ block: "nearest" });
     this.#part("newer").hidden = !conflict || isNew;
-    const key = zone === null ? "" : `${isNew} ${zone.id}`;
-    if (key !== this.#shown) this.#part("question").hidden = true;
+    const key = zone === null ? "" : `${isNew} ${zone.id} ${revision}`;
+    this.#isFresh = key !== this.#shown;
+    if (this.#isFresh) this.#part("question").hidden = true;
     if (zone) this.#show(zone);
-    if (zone && key !== this.#shown) this.#field("name").focus();
+    if (zone && this.#isFresh) this.#field("name").focus();
     this.#shown = key;
   }
 
@@ -64,18 +69,18 @@ export class ZoneForm {
     for (const name of /** @type {const} */ (["name", "colour", "dwell_s", "delay_s"])) this.#fill(name, String(zone[name] ?? ""));
     this.#field("radius_m").disabled = !isCircle;
     this.#measure("radius_m", isCircle ? shape.radius_m : null);
-    this.#measure("speed_mps", zone.speed_mps);
+    for (const name of MEASURES) this.#measure(name, zone[name]);
   }
 
   /** Write a value, but not over what is being typed. @param {string} name @param {string} value */
   #fill(name, value) {
     const field = this.#field(name);
-    if (field !== document.activeElement && field.value !== value) field.value = value;
+    if ((field !== document.activeElement || this.#isFresh) && field.value !== value) field.value = value;
   }
 
   /** @param {string} name @param {number | null} value in SI units */
   #measure(name, value) {
-    if (this.#field(name) !== document.activeElement) writeMeasure(this.#field(name), value);
+    if (this.#field(name) !== document.activeElement || this.#isFresh) writeMeasure(this.#field(name), value);
   }
 
   /** @returns {Partial<Zone>} */
@@ -88,7 +93,8 @@ export class ZoneForm {
     return {
       name: this.#field("name").value, colour: this.#field("colour").value,
       enter: this.#field("enter").checked, exit: this.#field("exit").checked,
-      dwell_s: number("dwell_s"), speed_mps: readMeasure(this.#field("speed_mps")), delay_s: number("delay_s") ?? 1,
+      dwell_s: number("dwell_s"), delay_s: number("delay_s") ?? 1,
+      ...Object.fromEntries(MEASURES.map((name) => [name, readMeasure(this.#field(name))])),
       tags: list("tags", /[\s,]+/), groups: list("groups", /\s*,\s*/),
       shape: shape.type === "circle" && radius_m !== null ? { ...shape, radius_m } : shape,
     };

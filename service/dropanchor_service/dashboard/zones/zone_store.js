@@ -14,6 +14,8 @@ import { Refreshed } from "../data/refreshed.js";
  * @property {boolean} exit
  * @property {number | null} dwell_s
  * @property {number | null} speed_mps
+ * @property {number | null} z_min_m
+ * @property {number | null} z_max_m
  * @property {number} delay_s
  * @property {string[]} tags
  * @property {string[]} groups

@@ -10,6 +10,7 @@ import { withCorner } from "./shape_edit.js";
 import { ZoneForm } from "./zone_form.js";
 import { ZoneList } from "./zone_list.js";
 import { ZoneStore } from "./zone_store.js";
+import { t } from "../i18n/language.js";
 
 const PADDING_PX = 64;
 const MIN_SIDE_M = 2;
@@ -24,17 +25,20 @@ const byId = (id) => /** @type {T} */ (document.getElementById(id));
 export class Zones {
   store = new ZoneStore();
   log = new EventLog();
-  editor = new ZoneEditor(this.store);
   /** Id of a zone. @type {string | null} */
   selected = null;
   #timer = 0;
 
   /** @param {import("../map/map.js").LiveMap} map @param {import("../data/connection.js").Connection} connection
-   * @param {(tag: string) => void} selectTag */
-  constructor(map, connection, selectTag) {
+   * @param {import("../data/changes.js").Changes} changes @param {(tag: string) => void} selectTag
+   * @param {import("../page/one_panel.js").Panels} panels */
+  constructor(map, connection, changes, selectTag, panels) {
     this.map = map;
     this.connection = connection;
     this.selectTag = selectTag;
+    this.panels = panels;
+    this.editor = new ZoneEditor(this.store, changes);
+    panels.add("zone", { isOpen: () => this.editor.zone !== null, isUnsaved: () => this.editor.isUnsaved, saving: () => this.editor.saving.now, leave: () => this.editor.close() });
     const box = byId("zone-list");
     this.handles = new Handles(byId("handles"), map, this.editor);
     this.events = new EventList(/** @type {HTMLDetailsElement} */ (byId("events")), this.log, (event) => this.pick(event));
@@ -45,6 +49,7 @@ export class Zones {
     map.underlays.push((scene) => this.#draw(scene));
     this.store.addEventListener("change", () => this.#update());
     this.editor.addEventListener("change", () => this.#update());
+    changes.addEventListener("done", (event) => /** @type {CustomEvent} */ (event).detail.startsWith("zones/") && this.store.refresh());
     this.log.addEventListener("change", () => this.#happened());
     connection.addEventListener("status", () => this.#connected(connection.status === "live"));
   }
@@ -92,20 +97,37 @@ export class Zones {
 
   /** Open the list and edit a zone. @param {string} id */
   edit(id) {
-    /** @type {HTMLDetailsElement} */ (byId("zone-list")).open = true;
-    this.select(id);
-    this.editor.open(id);
+    if (id === this.editor.zone?.id) return;
+    this.panels.open("zone", () => {
+      /** @type {HTMLDetailsElement} */ (byId("zone-list")).open = true;
+      this.select(id);
+      this.editor.open(id);
+    });
   }
 
   /** Begin a new zone, and keep the map where it is meanwhile. @param {import("./zone_store.js").Shape} shape */
   #begin(shape) {
-    this.map.takeOver();
-    this.editor.begin(shape);
+    this.panels.open("zone", () => {
+      this.map.takeOver();
+      /** @type {HTMLDetailsElement} */ (byId("zone-list")).open = true;
+      this.editor.begin(shape);
+    });
   }
 
-  /** @returns {import("./zone_store.js").Shape} */
-  #newCircle() {
-    const { x, y, scale } = this.map.view;
+  /** Whether this page may begin a new zone now. */
+  get mayBegin() {
+    return this.store.mayWrite && this.editor.zone === null;
+  }
+
+  /** Begin a new zone at a place: a circle around it, or a polygon with its first corner there.
+   * @param {"circle" | "polygon"} type @param {number} x m @param {number} y m */
+  beginAt(type, x, y) {
+    this.#begin(type === "circle" ? this.#newCircle(x, y) : { type, points: [[round(x), round(y)]] });
+  }
+
+  /** @param {number} [x] m @param {number} [y] m @returns {import("./zone_store.js").Shape} */
+  #newCircle(x = this.map.view.x, y = this.map.view.y) {
+    const { scale } = this.map.view;
     return { type: "circle", x: round(x), y: round(y), radius_m: Math.max(0.1, round(NEW_PX / scale)) };
   }
 
@@ -115,7 +137,7 @@ export class Zones {
     if (zone?.shape.type !== "polygon") return;
     const { x, y, scale } = this.map.view;
     const turn = (zone.shape.points.length * Math.PI) / 2 + Math.PI / 4;
-    this.editor.change({ shape: withCorner(zone.shape, x + (NEW_PX / scale) * Math.cos(turn), y + (NEW_PX / scale) * Math.sin(turn)) });
+    this.editor.reshape(t("zone.corner_added"), withCorner(zone.shape, x + (NEW_PX / scale) * Math.cos(turn), y + (NEW_PX / scale) * Math.sin(turn)));
     this.handles.focusLast();
   }
 

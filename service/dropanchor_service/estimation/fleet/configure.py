@@ -17,7 +17,7 @@ START_HEADING_STD = 0.05  # rad
 START_SPEED_STD = 0.3  # m/s
 REFERENCE_STD = 0.1  # rad, constant error of a heading reference
 SPEED_MAX = 10.0  # m/s
-MOUNT_KNOWN_STD, MOUNT_UNKNOWN_STD = 0.02, 0.5  # rad
+MOUNT_UNKNOWN_STD = 0.5  # rad
 SLIP_KNOWN_STD, SLIP_UNKNOWN_STD = 0.05, 0.1  # rad, slip of what drives, sway of what is carried
 SLIP_KNOWN_TAU, SLIP_UNKNOWN_TAU = 1.0, 3.0  # s
 GYRO_BIAS_STD = 0.001  # rad/s, least bias of the gyroscope that the front-end leaves
@@ -32,12 +32,12 @@ def configure_row(columns: Array, tuning: Tuning) -> Array:
             settings[name] = columns[name]
     angle_given = math.isfinite(columns["mount_angle"])
     settings["mount_angle"] = columns["mount_angle"] if angle_given else 0.0
-    settings["mount_angle_std"] = _given(
-        columns["mount_angle_std"], MOUNT_KNOWN_STD if angle_given else MOUNT_UNKNOWN_STD
-    )
+    mount_std = tuning.mount_known_std if angle_given else MOUNT_UNKNOWN_STD
+    settings["mount_angle_std"] = _given(columns["mount_angle_std"], mount_std)
     settings["slip_given"] = math.isfinite(columns["slip_std"])
     settings["slip_std"] = _given(columns["slip_std"], SLIP_KNOWN_STD if angle_given else SLIP_UNKNOWN_STD)
     settings["slip_tau"] = SLIP_KNOWN_TAU if angle_given else SLIP_UNKNOWN_TAU
+    settings["range_std_given"] = math.isfinite(columns["range_std"]) and columns["range_std"] > 0.0
     settings["range_std"] = _positive(columns["range_std"], RANGE_STD)
     settings["range_bias_std"] = _given(columns["range_bias_std"], tuning.range_bias_std)
     settings["height_std"] = HEIGHT_STD

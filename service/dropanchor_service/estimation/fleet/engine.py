@@ -4,16 +4,18 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import ANCHOR, Array, PoseBatch, SampleBatch
 from dropanchor_service.estimation.fleet.belief.layout import BELIEF, MAX_HYPOTHESES, ROW, make_workspace
-from dropanchor_service.estimation.fleet.belief.pool import make_pool, release, with_room
+from dropanchor_service.estimation.fleet.belief.pool import fitted, make_pool, release
 from dropanchor_service.estimation.fleet.belief.step import advance
-from dropanchor_service.estimation.fleet.configure import configure_row
+from dropanchor_service.estimation.fleet.configure import HEIGHT_STD, configure_row
 from dropanchor_service.estimation.fleet.frontend.assembly import assemble_nodes
 from dropanchor_service.estimation.fleet.frontend.batching import MAX_LAG_S
+from dropanchor_service.estimation.fleet.frontend.height import HEIGHT, start_height
 from dropanchor_service.estimation.fleet.frontend.node import NODE
 from dropanchor_service.estimation.fleet.frontend.ordering import SampleQueue
 from dropanchor_service.estimation.fleet.frontend.platform import PLATFORM
 from dropanchor_service.estimation.fleet.frontend.state import FRONTEND, start_frontend
 from dropanchor_service.estimation.fleet.outputs import (
+    doubted_of,
     innovations_of,
     modes_of,
     poses_of,
@@ -25,11 +27,13 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 
 HARD_IRON, HARD_IRON_CALIBRATED = 1.0, 0.05  # prior sd of a magnetometer's hard iron, in units of the field
 
-_BY_ROW = ("rows", "fronts", "platforms")
+_BY_ROW = ("rows", "fronts", "platforms", "heights")
 
 
 class FleetEngine:
-    """Implement `Engine` and `Restorable`. A checkpoint copies the rows, the pool and the pending samples.
+    """Implement `Engine`, `Restorable`, `DeniesStarts` and `FollowsPressure`.
+
+    A checkpoint copies the rows, the pool and the pending samples.
 
     max_lag_s: how long the measurements of a row wait at most for IMU samples that come in batches.
     """
@@ -44,6 +48,7 @@ class FleetEngine:
         self._rows = np.zeros(0, ROW)
         self._fronts = np.zeros(0, FRONTEND)
         self._platforms = np.zeros(0, PLATFORM)
+        self._heights = np.zeros(0, HEIGHT)
         self._pool = make_pool(MAX_HYPOTHESES * 2)
         self._workspace = make_workspace()
         self._queue = SampleQueue(max_lag_s)
@@ -60,6 +65,7 @@ class FleetEngine:
         hard_iron = HARD_IRON_CALIBRATED if settings["magnetometer_calibrated"] else HARD_IRON
         start_frontend(self._fronts[row], hard_iron, float(settings["declination"]), int(settings["motion"]))
         self._platforms[row] = np.zeros((), PLATFORM)
+        start_height(self._heights[row], int(settings["height_motion"]), float(settings["height"]), HEIGHT_STD)
         self._queue.forget(row)
 
     def process(self, samples: SampleBatch) -> PoseBatch:
@@ -71,16 +77,18 @@ class FleetEngine:
         if not len(due.order):
             return PoseBatch(rejected=due.rejected, unused=due.unused, lags=due.lags)
         nodes, verdicts = np.zeros(len(due.order), NODE), np.zeros(len(samples.imu), np.uint8)
-        rows = (self._fronts, self._platforms, self._rows)
+        rows = (self._fronts, self._platforms, self._rows, self._heights)
         nodes = nodes[: assemble_nodes(samples.imu, due.events, due.order, *rows, nodes, verdicts)]
         beliefs = self._run_belief(nodes)
         skipped, stuck = skipped_of(samples.imu, verdicts), stuck_ranges_of(nodes, beliefs)
+        doubted = doubted_of(due.events, due.order, len(samples.imu))
+        unused = with_rows(with_rows(due.unused, "imu", skipped), "range", stuck)
         return PoseBatch(
             poses_of(nodes, beliefs),
             modes_of(nodes, beliefs, self._rows, self._pool, self._anchors, self._workspace),
             innovations_of(nodes, beliefs),
-            due.rejected | skipped | stuck,
-            with_rows(with_rows(due.unused, "imu", skipped), "range", stuck),
+            due.rejected | skipped | stuck | doubted,
+            with_rows(unused, "pressure", doubted),
             due.lags,
         )
 
@@ -100,10 +108,21 @@ class FleetEngine:
         beliefs = np.zeros(len(nodes), BELIEF)
         left = len(nodes)
         while left > 0:
-            self._pool = with_room(self._pool, MAX_HYPOTHESES)
+            self._pool = fitted(self._pool, self._rows[: self._configured], MAX_HYPOTHESES)
             rest, found = nodes[-left:], beliefs[-left:]
             left = advance(self._rows, self._pool, rest, self._anchors, self._tuning_record, self._workspace, found)
         return beliefs
+
+    def refer(self, row: int, reference: int) -> None:
+        """Compare the pressures of `row` with those of the row `reference`, -1: none. Its estimate goes on."""
+        height = self._heights[row]
+        if height["reference"] != reference:
+            height["reference"], height["referred"] = reference, 0
+
+    def are_at_start(self, rows: Array) -> Array:
+        """Return whether each of the rows still follows the start in its settings: nothing has denied it."""
+        at_start: Array = self._rows["start"]["known"][rows] == 1
+        return at_start
 
     def state(self) -> dict[str, Array]:
         """Return the rows, the pool and the pending samples, without copying them."""

@@ -9,10 +9,12 @@ from dropanchor_service.estimation.fleet.belief.layout import Anchors, Beliefs, 
 from dropanchor_service.estimation.fleet.belief.modes import list_modes
 from dropanchor_service.estimation.fleet.belief.states import AMBIGUOUS
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.event import PRESSURE_EVENT
+from dropanchor_service.estimation.fleet.frontend.height import DOUBTED
 from dropanchor_service.estimation.fleet.frontend.inertial import REPEATED, STUCK
 from dropanchor_service.estimation.fleet.frontend.node import BEARING, RANGE, Nodes
 
-MODES: Final = 8
+MODES: Final = 8  # at most, of a pose
 REJECTED_ABOVE: Final = 0.5  # outlier probability above which a measurement hardly moved the belief
 SKIPPED: Final = {REPEATED: "time_repeated", STUCK: "imu_stuck"}
 OF_RANGE, OF_BEARING = int(MeasurementKind.RANGE), int(MeasurementKind.BEARING)
@@ -44,6 +46,13 @@ def skipped_of(imu: Array, verdicts: Array) -> dict[str, Array]:
     return {reason: rows for reason, rows in by_reason.items() if len(rows)}
 
 
+def doubted_of(events: Array, order: Array, imu: int) -> dict[str, Array]:
+    """Return the row of each pressure that is in doubt, under the reason of its rejection. order: as of `Due`."""
+    taken = events[order[order >= imu] - imu]
+    doubted = (taken["kind"] == PRESSURE_EVENT) & (taken["anchor"] == DOUBTED)
+    return {"pressure_doubted": taken["row"][doubted]} if doubted.any() else {}
+
+
 def with_rows(by_kind: dict[str, Array], kind: str, rejected: dict[str, Array]) -> dict[str, Array]:
     """Return `by_kind` with the rows of `rejected`, which are all of one kind."""
     if not rejected:
@@ -68,6 +77,7 @@ def _write_poses(nodes: Nodes, beliefs: Beliefs, poses: Array) -> int:
         n += 1
         pose.row, pose.t_ns, pose.anchor, pose.range = node.row, node.t_ns, node.anchor, node.z
         pose.frame = belief.relative
+        pose.z, pose.z_std, pose.z_source = belief.z, belief.z_std, node.height_source
         pose.state, pose.reason, pose.yaw_rate = belief.state, belief.reason, belief.yaw_rate
         known = belief.hypotheses > 0
         pose.x = belief.x if known else np.nan
@@ -109,6 +119,7 @@ def _write_innovations(nodes: Nodes, beliefs: Beliefs, records: Array) -> int:
         record.predicted = node.z - record.innovation
         record.S = belief.innovation_variance
         record.p_outlier = belief.p_outlier
+        record.white_std, record.lasting_std = belief.white_std, belief.lasting_std
         record.fused = belief.p_outlier < REJECTED_ABOVE
     return n
 

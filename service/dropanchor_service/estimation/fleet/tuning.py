@@ -5,6 +5,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from dropanchor_service.estimation.fleet.belief.births.numbers import ALL
+
 TuningRecord: TypeAlias = npt.NDArray[np.void]  # (1,), what `Tuning.record` returns
 
 
@@ -18,23 +20,20 @@ class Tuning(NamedTuple):
     q_speed: float = 1e-4  # m^2/s^3, with an accelerometer
     q_speed_no_acc: float = 0.03  # m^2/s^3, without one
     q_speed_no_acc_moving: float = 0.04  # per (m/s)^2 of speed, up to 1 m/s
-    q_mount: float = 1e-6  # rad^2/s
-    platform_mount_std: float = 0.02  # rad
+    mount_known_std: float = 0.02  # rad, of a mounting angle that is told, or of a platform's own heading
     platform_slip_std: float = 0.15  # rad, of a heading without an IMU: slip, and lag of the readings
     platform_slip_tau: float = 1.0  # s
     aligned_std: float = 0.05  # rad, mounting angle of a tag whose body axis points along the course
-    aligned_log_prior: float = 3.0
+    aligned_log_prior: float = 1.0  # of such a tag: most are mounted straight
     mount_cell: float = 0.3  # rad, between the guesses of a mounting angle that nobody told
-    mount_cells: int = 7  # guesses on each side
+    mount_cells: int = 10  # guesses on each side: all around
     mount_straight: float = 0.5  # share of tags that point about ahead
-    mount_any: float = 0.05  # share of tags that may point anywhere in these cells
+    mount_any: float = 0.2  # share of tags that may point anywhere
     gyro_bias_std: float = 0.02  # rad/s, residual bias
     drift_std: float = 0.006  # rad/s, of a platform's heading that drifts
-    drift_log_prior: float = 0.0
     q_gyro: float = 1e-7  # (rad/s)^2/s, of a tag whose platform measures its heading beside it
     q_gyro_drift: float = 1e-4  # the same, of one that drifts
     class_rejected_weight: float = 1e-3  # weight below which a heading class no longer counts for the ellipse
-    drift_again_log_prior: float = 0.0  # log prior of a drifting gyroscope, where heading and gyroscope drift apart
     q_gyro_own: float = 1e-6  # the same, of all others
     acc_bias_std: float = 0.11  # m/s^2
     left_bias_std: float = 0.2  # m/s^2, larger: an arc tilts the sideways axis for seconds
@@ -45,43 +44,45 @@ class Tuning(NamedTuple):
     range_bias_std: float = 0.15  # m, of an uncalibrated tag and anchor pair: antenna delays
     range_bias_tau: float = 25.0  # s in which the bias becomes another one, with the place and the attitude
     q_nlos: float = 0.02  # m^2/s, range bias without line of sight
-    likelihood_power: float = 0.7
-    outlier_probability: float = 0.02
+    likelihood_power: float = 0.7  # of a range: its error is like that of the one before
+    noise_log_prior: float = -0.3  # of each level of errors of ranges that last, a factor 4 of the variance
+    noise_told_log_prior: float = -8.0  # the same, of a tag whose range_std was told
+    noise_block_s: float = 2.0  # s of ranges whose errors are judged together
+    noise_memory_s: float = 20.0  # s after which a judgement is forgotten
+    noise_peak_s: float = 60.0  # s after which a level of before is forgotten
+    outlier_probability: float = 0.02  # of a range
     outlier_mean: float = 0.8  # m
     outlier_std: float = 0.8  # m
-    outlier_floor: float = 1e-4
-    bilinear: float = 0.25  # second-order term: times the product of the variances of speed and slip, for a range
-    nlos_log_prior: float = -2.5
-    nlos_depth: float = 6.0  # log weight below the best at which a hypothesis gets no NLOS alternative
+    outlier_floor: float = 1e-4  # 1/m, density of an outlier of any length
+    nlos_log_prior: float = -2.5  # of a line of sight that was lost, or is back
     nlos_min_bias: float = 0.15  # m, extra bias below which there is a line of sight
     nlos_max_bias: float = 3.6  # m, extra bias above which the track is wrong and not the range
     nlos_tau: float = 2.0  # s
-    nlos_run: int = 4
+    nlos_run: int = 4  # ranges in a row that are too long or too short
     own_error_log_prior: float = -1.0  # log prior of a slow error of the heading reference
     own_error_again_log_prior: float = -2.0  # added when that class is tried again after it had died out
     own_error_std: float = 0.15  # rad
-    own_error_tau: float = 60.0  # s
     split_angle: float = 0.08  # rad
     split_curvature: float = 0.4  # of the range rate, over the errors of angle and speed, from which on it is split
     coarse_split_angle: float = 0.2  # rad, of a tag that starts again after a gap, until it is resolved
     coarse_hypotheses: int = 48  # hypotheses of such a tag
-    coarse_bearings: int = 24
-    coarse_speeds: int = 3
+    coarse_bearings: int = 24  # around the anchor, of such a tag
+    coarse_speeds: int = 3  # for each of them
     merge_distance: float = 0.5  # standard deviations, of hypotheses of equal weight
     merge_distance_at_rest: float = 1.0  # the same, of a tag at rest
     merge_light: float = 0.5  # growth of its square per unit of log weight that the lighter one lacks
     prune_depth: float = 10.0  # log weight below the best
     rest_std: float = 0.02  # m/s
     rest_gyro_std: float = 0.003  # rad/s
-    misfit_s: float = 3.0
+    misfit_s: float = 3.0  # s of ranges that are mostly outliers, after which a track is widened
     reverse_slack: float = 0.05  # m/s
     reverse_log_prior: float = -4.5  # log prior of driving off in the other direction
-    start_bearings: int = 36
-    start_speeds: int = 5
-    start_speed_max: float = 5.0
+    start_bearings: int = 36  # around the anchor, of an unknown start
+    start_speeds: int = 5  # for each of them
+    start_speed_max: float = 5.0  # m/s, the fastest of them
     mode_hysteresis: float = 2.0  # log weight by which another mode must win to be published
-    resolved_weight: float = 0.99
-    resolved_s: float = 2.0
+    resolved_weight: float = 0.99  # of one mode, from which on a tag is resolved
+    resolved_s: float = 2.0  # s for which it has held it
     model_forget: float = 60.0  # s
     q_walk_speed: float = 0.3  # m^2/s^3, of a carried tag, as all that follows
     walk_speed_std: float = 0.4  # m/s, about the usual speed
@@ -95,7 +96,7 @@ class Tuning(NamedTuple):
     front_std: float = 0.3  # rad
     sway_std: float = 0.3  # rad
     sway_tau: float = 2.0  # s
-    step_scale_std: float = 0.1
+    step_scale_std: float = 0.1  # log of the scale of a walker's step speed
     q_step_scale: float = 1e-4  # 1/s
     step_speed_share: float = 0.3  # of the speed that steps give
     step_speed_std: float = 0.2  # m/s, the least
@@ -103,21 +104,17 @@ class Tuning(NamedTuple):
     stand_std: float = 0.5  # m/s
     gait_angle_std: float = 0.7  # rad
     gait_offset_std: float = 0.6  # rad
-    q_gait_offset: float = 1e-4  # rad^2/s
-    device_turn_log_prior: float = -1.6
+    device_turn_log_prior: float = -1.6  # of a quick turn of the device and not of its carrier
     device_turn_var: float = 0.2  # m^2
-    device_turn_share: float = 0.1
-    walk_range_factor: float = 8.0  # times the variance of a range: errors beside a body last for seconds
-    walk_likelihood_power: float = 0.5
+    device_turn_share: float = 0.1  # of such a turn, error of its angle
+    walk_likelihood_power: float = 0.5  # of a range to a carried tag
     walk_spread: float = 1.8  # times the published variance: what this model leaves out of a person's motion
-    walk_outlier_probability: float = 0.03
-    walk_outlier_mean: float = 0.4  # m
-    walk_outlier_std: float = 0.4  # m
     walk_split_angle: float = 0.3  # rad
-    walk_hypotheses: int = 24
+    walk_hypotheses: int = 24  # at most, of a carried tag
     obs_window: float = 10.0  # s
-    obs_q: float = 0.003
-    obs_q_no_acc: float = 0.05
+    obs_q: float = 0.003  # (m/s)^2/s, speed noise in the information about the bearing
+    obs_q_no_acc: float = 0.05  # the same, without an accelerometer
+    births: int = ALL  # a bit for each birth of hypotheses that is switched on (`belief/births/table.without`)
 
     def record(self) -> TuningRecord:
         """Return the parameters as a structured array (1,): compiled code gets one pointer instead of all numbers."""

@@ -89,7 +89,8 @@ class PaperEngine:
             scale = self._tags[row].range_scale
             y = innovation.y * scale
             S = innovation.S * scale**2
-            yield row, t_ns, MeasurementKind.RANGE, anchor, measured, measured - y, y, S, math.nan, innovation.fused
+            values = (anchor, measured, measured - y, y, S, math.nan, innovation.fused, math.nan, math.nan)
+            yield row, t_ns, MeasurementKind.RANGE, *values
 
     def _rejection(self, event: Event) -> str | None:
         """Return why a sample is not used, or None. The ingest screens values first; this keeps the state safe."""

@@ -40,11 +40,12 @@ class RangeVerdict(IntEnum):
 
 class Finding(NamedTuple):
     """One fault. name: for machines. sentence: what it is and what to do. setting: of the tag, and the value that
-    mends it; None where no setting does."""
+    mends it; None where no setting does. number: the number or axis in the sentence; None: it has none."""
 
     name: str
     sentence: str
     setting: tuple[str, str | bool] | None = None
+    number: str | None = None
 
 
 _AXIS = "xyz"
@@ -63,7 +64,8 @@ IMU_SENTENCES = {
     ImuVerdict.ACC_IN_G: "The accelerations look like g, not m/s²: multiply them by 9.80665, or set `acc_unit` to g.",
     ImuVerdict.ACC_IN_MG: "The accelerations look like thousandths of g, not m/s²: multiply them by 0.00980665, or "
     "set `acc_unit` to mg.",
-    ImuVerdict.ACC_SCALE: "The accelerations are {0} m/s² on average, and gravity is 9.8: check their unit and scale.",
+    ImuVerdict.ACC_SCALE: "The accelerations are {number} m/s² on average, and gravity is 9.8: check their unit and "
+    "scale.",
     ImuVerdict.ACC_NO_GRAVITY: "Gravity is missing from the accelerations: send what the sensor measures (total "
     "acceleration), not linear acceleration.",
     ImuVerdict.ACC_SILENT: "The accelerometer is silent, all its values are 0: check its wiring and its driver.",
@@ -76,22 +78,24 @@ IMU_SENTENCES = {
     ImuVerdict.GYRO_IN_DEG: "The rates of turn look like °/s, not rad/s: multiply them by 0.0174533, or set "
     "`gyro_unit` to deg/s.",
     ImuVerdict.GYRO_STUCK: "The gyroscope repeats one value while the tag moves: check its driver.",
-    ImuVerdict.AXES_DIFFER: f"The gyroscope turns about its {{0}} axis, but gravity does not follow: {_IN_ONE_ORDER}",
+    ImuVerdict.AXES_DIFFER: "The gyroscope turns about its {number} axis, but gravity does not follow: "
+    + _IN_ONE_ORDER,
     ImuVerdict.TURNS_DIFFER: f"The gyroscope and the magnetometer turn in different ways: {_IN_ONE_ORDER}",
     ImuVerdict.TURNS_DOUBTED: f"The gyroscope and the magnetometer seem to turn in different ways: {_IN_ONE_ORDER}",
     ImuVerdict.AXES_DOUBTED: f"The gyroscope turns about an axis that gravity does not follow: {_IN_ONE_ORDER}",
-    ImuVerdict.RAW_COUNTS: "The IMU's values are beyond what such sensors measure ({0} along one axis): they look "
+    ImuVerdict.RAW_COUNTS: "The IMU's values are beyond what such sensors measure ({number} along one axis): they look "
     "like raw counts, so multiply them by the scale of the data sheet (m/s², rad/s, µT).",
 }
 RANGE_SENTENCES = {
     RangeVerdict.IN_MM: "The ranges look like millimetres: divide them by 1000, or set `range_unit` to mm.",
     RangeVerdict.IN_CM: "The ranges look like centimetres: divide them by 100, or set `range_unit` to cm.",
-    RangeVerdict.AVERAGED: "The module averages about {0} ranges, so that their errors last: switch its filter off.",
+    RangeVerdict.AVERAGED: "The module averages about {number} ranges, so that their errors last: switch its "
+    "filter off.",
 }
 SENTENCES = {verdict.name.lower(): text for verdict, text in IMU_SENTENCES.items()} | {
     f"range_{verdict.name.lower()}": text for verdict, text in RANGE_SENTENCES.items()
 }
-"""The sentence of every finding, by its name; {0} stands for a number or an axis."""
+"""The sentence of every finding, by its name; {number} stands for a number or an axis."""
 
 
 def findings(check: Array) -> list[Finding]:
@@ -99,12 +103,16 @@ def findings(check: Array) -> list[Finding]:
     found = []
     imu, ranges = ImuVerdict(int(check["imu_verdict"])), RangeVerdict(int(check["range_verdict"]))
     if imu:
-        sentence = IMU_SENTENCES[imu].format(_detail_of(imu, float(check["imu_detail"])))
-        found.append(Finding(imu.name.lower(), sentence, _WAY_OUT.get(imu)))
+        found.append(_finding(imu.name.lower(), _detail_of(imu, float(check["imu_detail"])), _WAY_OUT.get(imu)))
     if ranges:
-        sentence = RANGE_SENTENCES[ranges].format(f"{float(check['range_detail']):.0f}")
-        found.append(Finding(f"range_{ranges.name.lower()}", sentence, _RANGE_WAY_OUT.get(ranges)))
+        number = f"{float(check['range_detail']):.0f}"
+        found.append(_finding(f"range_{ranges.name.lower()}", number, _RANGE_WAY_OUT.get(ranges)))
     return found
+
+
+def _finding(name: str, number: str, setting: tuple[str, str | bool] | None) -> Finding:
+    text = SENTENCES[name]
+    return Finding(name, text.format(number=number), setting, number if "{number}" in text else None)
 
 
 def _detail_of(verdict: ImuVerdict, detail: float) -> str:

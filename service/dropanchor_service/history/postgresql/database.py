@@ -15,7 +15,7 @@ from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.postgresql.connections import Connections
 from dropanchor_service.history.postgresql.days import DAY_NS, drop_day, existing_days, used_bytes
 from dropanchor_service.history.postgresql.errors import sentence
-from dropanchor_service.history.postgresql.schema import SCHEMA, is_prepared, prepare
+from dropanchor_service.history.postgresql.schema import SCHEMA, prepare, require_current
 from dropanchor_service.history.storage import Usage
 
 MOST_WRITING, MOST_READING = 2, 4  # connections of a service
@@ -118,7 +118,7 @@ class Database:
             raise HistoryError(self._away[1])  # the writer tries: who answers current poses must not wait for it
         connection = self._connect()
         try:
-            if not is_prepared(connection):
+            if not require_current(connection):
                 raise NoHistoryYetError
         except BaseException:
             connection.close()

@@ -11,7 +11,7 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import POSE, Array, Frame
 from dropanchor_service.history.records import ESTIMATED, StoredPoses
-from dropanchor_service.history.summaries import POINT, RELATIVE, summary_of_each
+from dropanchor_service.history.summaries import POINT, RELATIVE, SAME_IN_POINT, summary_of_each
 
 
 class Column(NamedTuple):
@@ -40,6 +40,7 @@ _CONTENT = [
     ),
     Column("state", "smallint", ">i2", "state"),
     Column("reason", "smallint", ">i2", "reason"),
+    Column("z_source", "smallint", ">i2", "z_source"),
     Column("relative", "boolean", "u1"),
 ]
 COLUMNS = [*_KEYS, *_CONTENT]
@@ -55,8 +56,8 @@ _ARRAY_HEAD = 20  # bytes before the first element of an array of one dimension
 
 STORED = [column.name for column in COLUMNS if column.name not in ("site", "tag")]
 """The columns from which `stored_poses` makes poses."""
-POINTS = ["tag", "t_ns", "state", "relative", "x", "y", "heading_rad", "speed_mps", "sigma_pos_m"]
-POINTS += ["cov_xx", "cov_xy", "cov_yy"]
+_OF_POINTS = {column.field: column.name for column in COLUMNS if column.field in SAME_IN_POINT}
+POINTS = ["tag", "relative", *_OF_POINTS.values(), "cov_xx", "cov_xy", "cov_yy"]
 """The columns from which `summaries` makes summaries."""
 
 
@@ -103,10 +104,10 @@ def summaries(row: Sequence[bytes]) -> Array:
     """Return the SUMMARY of each single pose in these arrays of POINTS."""
     columns = _columns(POINTS, row)
     points = np.zeros(len(columns["t_ns"]), POINT)
-    for name in ("t_ns", "state", "x", "y", "cov_xx", "cov_xy", "cov_yy"):
+    for field, name in _OF_POINTS.items():
+        points[field] = columns[name]
+    for name in ("cov_xx", "cov_xy", "cov_yy"):
         points[name] = columns[name]
-    points["heading"], points["speed"] = columns["heading_rad"], columns["speed_mps"]
-    points["sigma_pos"] = columns["sigma_pos_m"]
     points["state"] |= np.where(columns["relative"], RELATIVE, 0).astype(np.uint8)
     return summary_of_each(columns["tag"], points)
 

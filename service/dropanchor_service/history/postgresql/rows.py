@@ -26,6 +26,11 @@ SELECT {arrays(POINTS)} FROM poses p
 WHERE site = %s AND t_ns BETWEEN %s AND %s AND (%s::integer[] IS NULL OR tag = ANY (%s)) AND NOT {FENCED}
 GROUP BY t_ns / {_CHUNK_NS}
 """
+_FILLED = """
+SELECT n FROM generate_series(0, %s::bigint - 1) AS part(n)
+WHERE EXISTS (SELECT FROM slots WHERE site = %s AND t_ns >= %s + n * %s::bigint AND t_ns < %s + (n + 1) * %s::bigint)
+ORDER BY n
+"""
 _STRETCHES = "FROM stretches WHERE site = %s AND level = %s AND from_ns >= %s AND from_ns < %s"
 _PUT = """
 INSERT INTO stretches (site, level, from_ns, epoch, summaries, heads, cells) VALUES (%s, %s, %s, %s, %s, %s, %s)
@@ -82,6 +87,10 @@ class PostgresqlRows:
     def count_slots(self, from_ns: int, to_ns: int) -> int:
         sql = "SELECT count(*) FROM slots WHERE site = %s AND t_ns > %s AND t_ns <= %s"
         return int(self._all(sql, self._site, from_ns - SLOT_NS, to_ns)[0][0])
+
+    def filled_parts(self, first_slot: int, slots: int, count: int) -> list[int]:
+        first, length = first_slot * SLOT_NS, slots * SLOT_NS
+        return [n for (n,) in self._all(_FILLED, count, self._site, first, length, first, length)]
 
     def stretch_bytes(self, kind: Kind, level: int, stretches: range) -> int:
         size = " + ".join(f"octet_length({blob})" for blob in _BLOBS[kind])

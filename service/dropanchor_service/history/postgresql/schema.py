@@ -1,16 +1,13 @@
 """The tables in the database, and their version."""
 
-import logging
-
-from psycopg import Connection, errors
+from psycopg import Connection
 
 from dropanchor_service.estimation.columns import State
 from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.postgresql.pose_columns import COLUMNS
 
 SCHEMA = "dropanchor_history"
-VERSION = 1
-_log = logging.getLogger(__name__)
+VERSION = 2  # 1: without heights
 LOCK = 0x64726F70  # first half of the keys of all advisory locks; 0 as the second half is the schema, others are sites
 
 FENCED = "EXISTS (SELECT FROM epochs e WHERE e.tag = p.tag AND e.epoch > p.epoch AND e.first_ns <= p.t_ns)"
@@ -22,16 +19,25 @@ _X, _Y, _HEADING, _SIGMA = (
     f"CASE WHEN NOT p.relative THEN p.{name} END AS {name}" for name in ("x", "y", "heading_rad", "sigma_pos_m")
 )
 _OF_OWN = ", ".join(f"CASE WHEN p.relative THEN p.{name} END AS relative_{name}" for name in ("x", "y", "heading_rad"))
+_Z = ", ".join(f"nullif(p.{name}, 'NaN') AS {name}" for name in ("z", "z_std_m"))
 _VIEW = f"""
 CREATE OR REPLACE VIEW tracks AS
     SELECT sites.name AS site, tags.name AS tag, to_timestamp(p.t_ns / 1e9) AS time, p.t_ns,
         CASE WHEN p.relative AND p.state IN ({_PLACED}) THEN 'relative'
             ELSE (ARRAY[{_STATES}])[p.state + 1] END AS state,
-        p.relative, {_X}, {_Y}, {_HEADING}, p.speed_mps, {_SIGMA}, {_OF_OWN}
+        p.relative, {_X}, {_Y}, {_HEADING}, p.speed_mps, {_SIGMA}, {_OF_OWN}, {_Z}
     FROM poses p JOIN tags ON tags.id = p.tag JOIN sites ON sites.id = p.site WHERE NOT {FENCED};
 """
 """A place in a frame of the tag's own has columns of its own, so that nobody takes it for one of the site."""
-_HAS_VIEW = "SELECT FROM pg_attribute WHERE attrelid = to_regclass('tracks') AND attname = 'relative_x'"
+_ADD_HEIGHTS = f"""
+ALTER TABLE poses ADD COLUMN z real NOT NULL DEFAULT 'NaN', ADD COLUMN z_std_m real NOT NULL DEFAULT 'NaN',
+    ADD COLUMN z_source smallint NOT NULL DEFAULT 0;
+INSERT INTO missing SELECT site, level, from_ns FROM stretches ON CONFLICT DO NOTHING;
+TRUNCATE stretches;
+{_VIEW}
+UPDATE schema_version SET version = {VERSION};
+"""
+"""The step from version 1. Summaries have heights, too, and are written again."""
 _CREATE = f"""
 CREATE TABLE schema_version (version integer NOT NULL);
 INSERT INTO schema_version VALUES ({VERSION});
@@ -66,45 +72,43 @@ ALTER TABLE stretches ALTER summaries SET STORAGE EXTERNAL, ALTER heads SET STOR
 {_VIEW}"""
 
 
-def is_prepared(connection: Connection) -> bool:
-    """Return whether the tables exist. Raises HistoryError when they are of a later version."""
-    if connection.execute("SELECT to_regclass(%s)", (f"{SCHEMA}.schema_version",)).fetchone() == (None,):
-        return False
-    found = connection.execute("SELECT max(version) FROM schema_version").fetchone()
-    version = 0 if found is None else found[0]
-    if version != VERSION:
-        raise HistoryError(
-            f"the history in the database has schema version {version}, but this service needs {VERSION}: "
-            "update the service, or name another database"
-        )
-    return True
+def require_current(connection: Connection) -> bool:
+    """Return whether there are tables. Raises HistoryError when they are of another version."""
+    version = _version(connection)
+    if version not in (0, VERSION):
+        raise _refusal(version)
+    return version == VERSION
 
 
 def prepare(connection: Connection) -> None:
-    """Make the tables, unless they exist, and the view, unless it is new. Raises HistoryError when they are of a later
-    version."""
+    """Make the tables, or bring them to this version. Raises HistoryError when they are of a later version."""
     with connection.transaction():
         lock(connection, 0)
-        if not is_prepared(connection):
+        version = _version(connection)
+        if version > VERSION:
+            raise _refusal(version)
+        if version == 0:
             # The right to make schemas is only needed where the schema does not exist.
             if connection.execute("SELECT FROM pg_namespace WHERE nspname = %s", (SCHEMA,)).fetchone() is None:
                 connection.execute(f"CREATE SCHEMA {SCHEMA}")
             connection.execute(_CREATE)
-        elif connection.execute(_HAS_VIEW).fetchone() is None:
-            _replace_view(connection)
+        elif version < VERSION:
+            connection.execute(_ADD_HEIGHTS)
 
 
-def _replace_view(connection: Connection) -> None:
-    """Replace the view of versions before the state `relative`. The tables are the same."""
-    try:
-        with connection.transaction():
-            connection.execute(_VIEW)
-    except errors.InsufficientPrivilege:
-        _log.warning(
-            "the view %s.tracks still shows places of relative poses as if they were of the site: only its owner can "
-            "replace it, so start the service once with that role",
-            SCHEMA,
-        )
+def _version(connection: Connection) -> int:
+    """Return the version of the tables, 0 without any."""
+    if connection.execute("SELECT to_regclass(%s)", (f"{SCHEMA}.schema_version",)).fetchone() == (None,):
+        return 0
+    found = connection.execute("SELECT max(version) FROM schema_version").fetchone()
+    return 0 if found is None else int(found[0])
+
+
+def _refusal(version: int) -> HistoryError:
+    return HistoryError(
+        f"the history in the database has schema version {version}, but this service needs {VERSION}: "
+        "update the service, or name another database"
+    )
 
 
 def lock(connection: Connection, number: int) -> None:

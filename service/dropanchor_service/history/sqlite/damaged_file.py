@@ -5,6 +5,9 @@ import time
 from contextlib import closing
 from pathlib import Path
 
+from dropanchor_schemas.sentences import say
+from dropanchor_service.runtime.recovery import damaged, unreadable
+
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 _STEPS = 10_000  # of SQLite between two looks at the clock, some ms
 
@@ -19,14 +22,14 @@ def damage_in(path: Path, most_s: float) -> str | None:
     try:
         with path.open("rb") as file:
             if not file.read(1):
-                return "is empty"
+                return say("is_empty", "is empty")
         return _damage_in_structure(path, time.monotonic() + most_s)
     except FileNotFoundError:
         return None
     except sqlite3.Error as error:  # not checked to its end, or locked: whoever uses it will tell
-        return f"is damaged ({error})" if is_damage(error) else None
+        return damaged(error) if is_damage(error) else None
     except OSError as error:
-        return f"cannot be read ({error.strerror})"
+        return unreadable(error)
 
 
 def _damage_in_structure(path: Path, end_s: float) -> str | None:
@@ -34,4 +37,4 @@ def _damage_in_structure(path: Path, end_s: float) -> str | None:
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
         connection.set_progress_handler(lambda: time.monotonic() > end_s, _STEPS)
         found = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
-    return None if found == "ok" else f"is damaged ({' '.join(found.split())})"
+    return None if found == "ok" else damaged(" ".join(found.split()))

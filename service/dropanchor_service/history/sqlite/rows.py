@@ -10,18 +10,19 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.history.records import NO_POSES, RECORD, SLOT_NS, StoredPoses, stored_poses
+from dropanchor_service.history.records import NO_HEIGHT, NO_POSES, RECORD, SLOT_NS, StoredPoses, stored_poses
 from dropanchor_service.history.stored import Kind
-from dropanchor_service.history.summaries import POINT, summary_of_each
+from dropanchor_service.history.summaries import POINT, SAME_IN_POINT, summary_of_each
 from dropanchor_service.history.summary_table import DAY, SLOTS
 from dropanchor_service.store.records import take
 
 MAX_NAMED = 100  # tags: beyond, reading all of them is faster than a search for each
 
 _JOINED = np.dtype([("tag", ">u4"), ("t_ns", ">i8"), ("pose", RECORD)])
-_OF_SLOTS = """
-SELECT group_concat(printf('%08x%016x', tag, t_ns) || hex(pose), '') FROM slots CROSS JOIN poses USING (slot)
-WHERE slots.slot BETWEEN ? AND ? AND t_ns BETWEEN ? AND ? {tags} GROUP BY slots.slot
+_WHOLE = f"substr(hex(pose) || '{NO_HEIGHT.hex()}', 1, {2 * RECORD.itemsize})"  # some end before the height
+_OF_SLOTS = f"""
+SELECT group_concat(printf('%08x%016x', tag, t_ns) || {_WHOLE}, '') FROM slots CROSS JOIN poses USING (slot)
+WHERE slots.slot BETWEEN ? AND ? AND t_ns BETWEEN ? AND ? {{tags}} GROUP BY slots.slot
 """
 _FORWARD = """
 SELECT t_ns, pose FROM slots CROSS JOIN poses USING (slot)
@@ -30,6 +31,11 @@ WHERE slots.slot BETWEEN ? AND ? AND tag = ? AND t_ns BETWEEN ? AND ? ORDER BY s
 _BACKWARD = _FORWARD.replace("slots.slot, t_ns", "slots.slot DESC, t_ns DESC")
 _MISSING = "SELECT DISTINCT slot / ? FROM slots EXCEPT SELECT stretch FROM heat WHERE level = ?"
 _STRETCHES = "WHERE level = ? AND stretch BETWEEN ? AND ?"
+_FILLED = """
+WITH RECURSIVE part(n) AS (SELECT 0 UNION ALL SELECT n + 1 FROM part WHERE n + 1 < :count)
+SELECT group_concat(n) FROM part
+WHERE EXISTS (SELECT 1 FROM slots WHERE slot >= :first + n * :slots AND slot < :first + (n + 1) * :slots)
+"""
 _BLOBS: dict[Kind, tuple[str, ...]] = {"summaries": ("tags",), "heat": ("heads", "cells")}
 
 
@@ -68,6 +74,11 @@ class SqliteRows:
     def count_slots(self, from_ns: int, to_ns: int) -> int:
         count = "SELECT count(*) FROM slots WHERE slot BETWEEN ? AND ?"
         return int(self._connection.execute(count, (from_ns // SLOT_NS, to_ns // SLOT_NS)).fetchone()[0])
+
+    def filled_parts(self, first_slot: int, slots: int, count: int) -> list[int]:
+        values = {"first": first_slot, "slots": slots, "count": count}
+        (joined,) = self._connection.execute(_FILLED, values).fetchone()
+        return sorted(map(int, joined.split(","))) if joined else []
 
     def stretch_bytes(self, kind: Kind, level: int, stretches: range) -> int:
         size = " + ".join(f"length({blob})" for blob in _BLOBS[kind])
@@ -110,7 +121,7 @@ class SqliteRows:
 def _summaries(joined: Array) -> Array:
     points, poses = np.zeros(len(joined), POINT), joined["pose"]
     points["t_ns"] = joined["t_ns"]
-    for name in ("state", "x", "y", "heading", "speed", "sigma_pos"):
+    for name in SAME_IN_POINT[1:]:
         points[name] = poses[name]
     points["cov_xx"], points["cov_xy"], points["cov_yy"] = poses["cov"][:, 0], poses["cov"][:, 1], poses["cov"][:, 3]
     return summary_of_each(joined["tag"], points)

@@ -5,18 +5,19 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.sqlite.damaged_file import damage_in, is_damage
 from dropanchor_service.history.sqlite.track_file import FileReader, TrackWriter
 from dropanchor_service.history.storage import Retention, Usage
-from dropanchor_service.runtime.recovery import Recovery
+from dropanchor_service.runtime.recovery import Recovery, damaged
 
 FILE_NAME = "history.sqlite"
 MAX_PRUNE_S = 0.5  # per write
 MAX_SUMMARISE_S = 0.2  # per write
 CHECK_S = 1.0  # at a start: a large file is checked in part
 FULL_CHECK_S = 60.0  # once a reader has found damage
-INSTEAD = "a new history was started"
+INSTEAD = say("new_history", "a new history was started")
 
 
 class SqliteStorage:
@@ -49,7 +50,7 @@ class SqliteStorage:
         try:
             self._write(poses, tags, anchors)
         except sqlite3.DatabaseError as error:
-            if not is_damage(error) or not self._set_aside(f"is damaged ({error})"):
+            if not is_damage(error) or not self._set_aside(damaged(error)):
                 raise
             self._write(poses, tags, anchors)
 

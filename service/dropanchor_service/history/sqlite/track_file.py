@@ -19,7 +19,7 @@ from dropanchor_service.history.sqlite.damaged_file import is_damage
 from dropanchor_service.history.sqlite.rows import SqliteRows
 from dropanchor_service.history.summary_table import SLOTS, SummaryTable
 
-VERSION = 3  # 1: without summaries, 2: without heat
+VERSION = 4  # 1: without summaries, 2: without heat, 3: without heights
 MAX_ROWS = 512  # per statement: sqlite3 releases the interpreter's lock in each one and must win it back
 BUSY_S = 5.0
 
@@ -46,7 +46,12 @@ CREATE TABLE poses (
 {_HEAT_SCHEMA}
 PRAGMA user_version = {VERSION};
 """
-_UPGRADES = {1: f"{_SUMMARY_SCHEMA} {_HEAT_SCHEMA}", 2: _HEAT_SCHEMA}  # from each version
+_AGAIN = f"{_SUMMARY_SCHEMA} {_HEAT_SCHEMA}"  # what is missing is summarised again
+_UPGRADES = {  # from each version
+    1: _AGAIN,
+    2: f"DROP TABLE summaries; {_AGAIN}",
+    3: f"DROP TABLE summaries; DROP TABLE heat; {_AGAIN}",
+}
 
 
 class TrackFileError(sqlite3.Error):

@@ -1,6 +1,5 @@
 """Recordings of this service: the samples of one of their tags, as the tag sent them."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -124,10 +123,8 @@ def _fill(readings: Readings, frames: Sequence[Frame], source: str, names: dict[
     readings.headings = headings_of(
         _times(headings), np.array([h.heading_rad for h in headings]), np.array([h.std_rad for h in headings])
     )
-    bearings = Counter(len(frame.bearings) for frame in frames)
-    readings.left_out.add(
-        source, "bearings: a recording folder has none", count=sum(n * c for n, c in bearings.items())
-    )
+    for field, why in (("bearings", "bearings: a recording folder has none"), ("pressures", "pressures: not imported")):
+        readings.left_out.add(source, why, count=sum(len(getattr(frame, field)) for frame in frames))
 
 
 def _times(samples: Sequence[object]) -> Array:

@@ -7,6 +7,8 @@ import os
 import resource
 import sys
 
+from dropanchor_schemas.pose import Phrase
+from dropanchor_schemas.sentences import said_by
 from dropanchor_service.plans.reading.messages import Description, ReadPlan, Request
 from dropanchor_service.plans.reading.read_plan import read_plan
 from dropanchor_service.plans.reading.refused import RefusedError
@@ -24,7 +26,7 @@ def main() -> None:
     try:
         read = read_plan(sys.stdin.buffer.read(), request)
     except RefusedError as error:
-        read = ReadPlan(Description(problem=str(error)), b"")
+        read = ReadPlan(Description(problem=said_by(error), problem_phrase=Phrase.of(said_by(error))), b"")
     sys.stdout.buffer.write(read.description.model_dump_json().encode() + b"\n" + read.content)
     sys.stdout.buffer.flush()
 

@@ -1,5 +1,6 @@
 """Tell the type of a file by its content."""
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.plans.reading.refused import RefusedError
 
 PNG, JPEG, TIFF, PDF, SVG = "image/png", "image/jpeg", "image/tiff", "application/pdf", "image/svg+xml"
@@ -21,10 +22,17 @@ def file_type_of(content: bytes, declared: str) -> str:
     """Return the media type of a file. declared: what the client says. Raises RefusedError when that is not true."""
     found = _found_type(content)
     if found is None:
-        raise RefusedError(f"the file is none that can be read here. Use {_READABLE}")
+        raise RefusedError(say("plan_kind", "the file is none that can be read here. Use {kinds}", kinds=_READABLE))
     stated = declared.partition(";")[0].strip().lower().replace("image/jpg", JPEG)
     if stated not in (found, *UNDECLARED):
-        raise RefusedError(f"the file is said to be {stated[:64]}, but its content is {found}")
+        raise RefusedError(
+            say(
+                "plan_other_kind",
+                "the file is said to be {stated}, but its content is {found}",
+                stated=stated[:64],
+                found=found,
+            )
+        )
     return found
 
 

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from PIL import Image
 from pymap3d.enu import geodetic2enu
-from pyproj import CRS, Transformer
-from pyproj.exceptions import ProjError
 
 from dropanchor_schemas.plans import MAX_M_PER_PX, Placement
+from dropanchor_schemas.sentences import said_by, say
 from dropanchor_schemas.site import Georeference
 from dropanchor_schemas.zones import MAX_COORDINATE_M
 
@@ -59,7 +58,10 @@ def placement_of(affine: Affine, size: tuple[int, int], crs: str, origin: Georef
     """Return where the image lies. crs: SITE, or a code such as EPSG:25832. Raises UnplacedError."""
     if not crs:
         raise UnplacedError(
-            "The file names no coordinate system that is known. Upload it with one, such as EPSG:25832."
+            say(
+                "ground_no_crs",
+                "The file names no coordinate system that is known. Upload it with one, such as EPSG:25832.",
+            )
         )
     width, height = size
     columns, rows = np.array([0.0, width, width, 0.0]), np.array([0.0, 0.0, height, height])
@@ -67,7 +69,10 @@ def placement_of(affine: Affine, size: tuple[int, int], crs: str, origin: Georef
     x, y = _in_site(a * columns + b * rows + c, d * columns + e * rows + f, crs, origin)
     if not max(np.abs(x).max(), np.abs(y).max()) <= MAX_COORDINATE_M:
         raise UnplacedError(
-            "The image does not lie within 100 km of the site's origin. Is its coordinate system right?"
+            say(
+                "ground_far",
+                "The image does not lie within 100 km of the site's origin. Is its coordinate system right?",
+            )
         )
     return _fitted(columns - width / 2, height / 2 - rows, x, y)
 
@@ -76,15 +81,36 @@ def _in_site(easting: Any, northing: Any, crs: str, origin: Georeference | None)
     if crs == SITE:
         return easting, northing
     if origin is None:
-        raise UnplacedError("The file says where it lies, but the site has no georeference. Align the plan by hand.")
-    try:
-        to_degrees = Transformer.from_crs(CRS.from_user_input(crs), "EPSG:4326", always_xy=True)
-        lon, lat = to_degrees.transform(easting, northing)
-    except ProjError as error:
-        raise UnplacedError(f"The coordinate system {crs} cannot be used: {error}") from error
+        raise UnplacedError(
+            say(
+                "ground_no_georeference",
+                "The file says where it lies, but the site has no georeference. Align the plan by hand.",
+            )
+        )
+    lon, lat = _degrees(easting, northing, crs)
     east, north, _ = geodetic2enu(lat, lon, np.zeros_like(lat), origin.lat, origin.lon, 0.0)
     cos_r, sin_r = math.cos(origin.rotation_rad), math.sin(origin.rotation_rad)
     return cos_r * east + sin_r * north, cos_r * north - sin_r * east
+
+
+def _degrees(easting: Any, northing: Any, crs: str) -> tuple[Any, Any]:
+    """Return longitude and latitude. Raises UnplacedError."""
+    try:
+        from pyproj import CRS, Transformer
+        from pyproj.exceptions import ProjError
+    except ModuleNotFoundError as error:
+        raise UnplacedError(
+            say("no_pyproj", "{crs} needs the extra `maps`: pip install 'dropanchor-service[maps]'", crs=crs)
+        ) from error
+    try:
+        lon, lat = Transformer.from_crs(CRS.from_user_input(crs), "EPSG:4326", always_xy=True).transform(
+            easting, northing
+        )
+    except ProjError as error:
+        raise UnplacedError(
+            say("ground_crs", "The coordinate system {crs} cannot be used: {why}", crs=crs, why=said_by(error))
+        ) from error
+    return lon, lat
 
 
 def _fitted(right: Any, up: Any, x: Any, y: Any) -> Placement:
@@ -98,8 +124,11 @@ def _fitted(right: Any, up: Any, x: Any, y: Any) -> Placement:
     residual = np.abs(places - centre - factor * pixels).max()
     if not 0 < np.abs(factor) <= MAX_M_PER_PX or not residual <= _MAX_DISTORTION * np.abs(places - centre).max():
         raise UnplacedError(
-            "Its pixels are not square on the ground, or mirrored, so a turn and a scale cannot place it. Convert it "
-            "to a metric coordinate system, such as UTM, or align it by hand."
+            say(
+                "ground_mirrored",
+                "Its pixels are not square on the ground, or mirrored, so a turn and a scale cannot place "
+                "it. Convert it to a metric coordinate system, such as UTM, or align it by hand.",
+            )
         )
     return Placement(
         x=float(centre.real),

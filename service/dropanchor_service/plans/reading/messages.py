@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pydantic import BaseModel, ConfigDict
 
 from dropanchor_schemas.plans import ImageType, Placement
+from dropanchor_schemas.pose import Phrase
 from dropanchor_schemas.site import Georeference
 
 
@@ -28,12 +29,14 @@ class Description(BaseModel):
     """The image that was made, or the problem why there is none."""
 
     problem: str = ""
+    problem_phrase: Phrase | None = None
     media_type: ImageType = "image/png"
     width_px: int = 1
     height_px: int = 1
     pages: int = 1
     placement: Placement | None = None
     note: str = ""
+    note_phrase: Phrase | None = None
 
 
 @dataclass(frozen=True)

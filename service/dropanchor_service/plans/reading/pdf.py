@@ -6,6 +6,7 @@ from PIL import Image
 from pypdfium2 import PdfDocument, PdfiumError
 from pypdfium2.raw import FPDF_ERR_PASSWORD
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.plans.reading.refused import RefusedError
 
 _DOTS_PER_POINT = 200 / 72
@@ -19,19 +20,21 @@ def drawn_page(content: bytes, number: int) -> tuple[Image.Image, int]:
         document = PdfDocument(content)
         pages = len(document)
         if not 1 <= number <= pages:
-            raise RefusedError(f"the PDF has {pages} pages, and page {number} was asked for")
+            raise RefusedError(
+                say("pdf_pages", "the PDF has {pages} pages, and page {page} was asked for", pages=pages, page=number)
+            )
         page = document[number - 1]
         return page.render(scale=_scale_of(*page.get_size())).to_pil().convert("RGB"), pages
     except PdfiumError as error:
         if error.err_code == FPDF_ERR_PASSWORD:
-            raise RefusedError("the PDF is encrypted. Save it without a password") from error
-        raise RefusedError("the PDF is damaged") from error
+            raise RefusedError(say("pdf_encrypted", "the PDF is encrypted. Save it without a password")) from error
+        raise RefusedError(say("pdf_damaged", "the PDF is damaged")) from error
 
 
 def _scale_of(width_pt: float, height_pt: float) -> float:
     """Return the pixels per point that keep the image within the limits. Raises RefusedError for an empty page."""
     if width_pt < 1 or height_pt < 1:
-        raise RefusedError("the page of the PDF has no area")
+        raise RefusedError(say("pdf_empty", "the page of the PDF has no area"))
     return min(
         _DOTS_PER_POINT, math.sqrt(_MAX_PIXELS / (width_pt * height_pt)), _MAX_SIDE_PX / max(width_pt, height_pt)
     )

@@ -5,6 +5,7 @@ from io import BytesIO
 from PIL import Image, ImageOps, UnidentifiedImageError
 
 from dropanchor_schemas.plans import MAX_SIDE_PX
+from dropanchor_schemas.sentences import said_by, say
 from dropanchor_service.plans.reading.file_types import JPEG, PNG, TIFF
 from dropanchor_service.plans.reading.refused import RefusedError
 
@@ -22,10 +23,12 @@ def open_image(content: bytes, media_type: str) -> Image.Image:
     try:
         image = Image.open(BytesIO(content), formats=[_FORMATS[media_type]])
     except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
-        raise RefusedError(f"the image is damaged: {error}") from error
+        raise RefusedError(say("plan_damaged", "the image is damaged: {why}", why=said_by(error))) from error
     require_size(*image.size)
     if image.mode in _DEEP_MODES:
-        raise RefusedError("its pixels are measurements, not colours. Save the picture with 8 bits per channel")
+        raise RefusedError(
+            say("plan_deep", "its pixels are measurements, not colours. Save the picture with 8 bits per channel")
+        )
     return image
 
 
@@ -34,11 +37,25 @@ def require_size(width: int, height: int) -> None:
     megapixels = width * height / 1e6
     if megapixels > MAX_MEGAPIXELS:
         raise RefusedError(
-            f"the image has {width} × {height} pixels, {megapixels:.0f} megapixels. At most {MAX_MEGAPIXELS} are "
-            "allowed: make it smaller"
+            say(
+                "plan_pixels",
+                "the image has {width} × {height} pixels, {megapixels} megapixels. At most {most} are "
+                "allowed: make it smaller",
+                width=width,
+                height=height,
+                megapixels=f"{megapixels:.0f}",
+                most=MAX_MEGAPIXELS,
+            )
         )
     if max(width, height) > MAX_SIDE_PX:
-        raise RefusedError(f"the image has a side of {max(width, height)} pixels. At most {MAX_SIDE_PX} are allowed")
+        raise RefusedError(
+            say(
+                "plan_side",
+                "the image has a side of {side} pixels. At most {most} are allowed",
+                side=max(width, height),
+                most=MAX_SIDE_PX,
+            )
+        )
 
 
 def pixels_of(image: Image.Image) -> Image.Image:
@@ -47,7 +64,7 @@ def pixels_of(image: Image.Image) -> Image.Image:
         turned = ImageOps.exif_transpose(image)
         return turned if turned.mode in _KEPT_MODES else turned.convert("RGB")
     except (OSError, SyntaxError, ValueError) as error:
-        raise RefusedError(f"the image is damaged: {error}") from error
+        raise RefusedError(say("plan_damaged", "the image is damaged: {why}", why=said_by(error))) from error
 
 
 def encoded(image: Image.Image, media_type: str) -> bytes:

@@ -3,11 +3,13 @@
 from PIL import Image
 
 from dropanchor_schemas.plans import ImageType, Placement
+from dropanchor_schemas.pose import Phrase
+from dropanchor_schemas.sentences import said_by, say
 from dropanchor_service.plans.reading.file_types import JPEG, PDF, SVG
 from dropanchor_service.plans.reading.ground import UnplacedError, affine_of_tiff, affine_of_world_file, placement_of
 from dropanchor_service.plans.reading.messages import Description, ReadPlan, Request
-from dropanchor_service.plans.reading.pdf import drawn_page
 from dropanchor_service.plans.reading.raster import encoded, open_image, pixels_of
+from dropanchor_service.plans.reading.refused import RefusedError
 from dropanchor_service.plans.reading.svg import sanitised
 
 
@@ -24,6 +26,12 @@ def _read_svg(content: bytes) -> ReadPlan:
 
 
 def _read_pdf(content: bytes, request: Request) -> ReadPlan:
+    try:
+        from dropanchor_service.plans.reading.pdf import drawn_page
+    except ModuleNotFoundError as error:
+        raise RefusedError(
+            say("no_pdf", "a PDF needs the extra `maps`: pip install 'dropanchor-service[maps]'")
+        ) from error
     image, pages = drawn_page(content, request.page)
     return ReadPlan(
         Description(media_type="image/png", width_px=image.width, height_px=image.height, pages=pages),
@@ -37,7 +45,12 @@ def _read_raster(content: bytes, request: Request) -> ReadPlan:
     placement, note = _placed(opened, request)
     kind: ImageType = "image/jpeg" if request.media_type == JPEG else "image/png"
     description = Description(
-        media_type=kind, width_px=image.width, height_px=image.height, placement=placement, note=note
+        media_type=kind,
+        width_px=image.width,
+        height_px=image.height,
+        placement=placement,
+        note=note,
+        note_phrase=Phrase.of(note),
     )
     return ReadPlan(description, encoded(image, kind))
 
@@ -53,4 +66,4 @@ def _placed(image: Image.Image, request: Request) -> tuple[Placement | None, str
     try:
         return placement_of(affine, image.size, request.crs or crs, request.georeference), ""
     except UnplacedError as error:
-        return None, str(error)
+        return None, said_by(error)

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 from defusedxml.common import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
+from dropanchor_schemas.sentences import said_by, say
 from dropanchor_service.plans.reading.refused import RefusedError
 from dropanchor_service.plans.reading.svg_size import size_of
 from dropanchor_service.plans.reading.svg_styles import at_rest
@@ -31,13 +32,15 @@ def sanitised(content: bytes) -> tuple[bytes, int, int]:
     try:
         root = fromstring(content, forbid_entities=True, forbid_external=True)
     except DefusedXmlException as error:
-        raise RefusedError("the SVG declares entities. Save it as plain SVG") from error
+        raise RefusedError(say("svg_entities", "the SVG declares entities. Save it as plain SVG")) from error
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise RefusedError(f"the SVG is damaged: {error}") from error
+        raise RefusedError(say("svg_damaged", "the SVG is damaged: {why}", why=said_by(error))) from error
     if root.tag != f"{_SVG}svg":
-        raise RefusedError("the file is XML, but no SVG")
+        raise RefusedError(say("svg_other", "the file is XML, but no SVG"))
     if sum(1 for _ in root.iter()) > MAX_ELEMENTS:
-        raise RefusedError(f"the SVG has more than {MAX_ELEMENTS} elements. Save it as PNG or PDF")
+        raise RefusedError(
+            say("svg_large", "the SVG has more than {n} elements. Save it as PNG or PDF", n=MAX_ELEMENTS)
+        )
     _clean(root)
     Scales(root, {element: _name(element) for element in root.iter()}).require_bearable()
     width, height = size_of(root)
@@ -55,7 +58,11 @@ def _clean(element: ElementTree.Element) -> None:
         name = _name(found)
         if not _DRAWING.fullmatch(name):
             raise RefusedError(
-                f"the SVG contains <{name[:40]}>, which is not allowed. Save it as plain SVG, PNG or PDF"
+                say(
+                    "svg_element",
+                    "the SVG contains <{name}>, which is not allowed. Save it as plain SVG, PNG or PDF",
+                    name=name[:40],
+                )
             )
         found.attrib = dict(_kept_attributes(found))
         if name == "style":
@@ -69,7 +76,13 @@ def _kept_attributes(element: ElementTree.Element) -> Iterator[tuple[str, str]]:
         if name in _HREFS:
             yield "href", _local_href(_name(element), value)
         elif name.lower().startswith("on"):
-            raise RefusedError(f"the SVG contains a script: the attribute {name[:40]}. Save it as plain SVG")
+            raise RefusedError(
+                say(
+                    "svg_script",
+                    "the SVG contains a script: the attribute {name}. Save it as plain SVG",
+                    name=name[:40],
+                )
+            )
         elif not name.startswith("{"):
             _require_local(value)
             yield name, at_rest(value) if name == "style" else value
@@ -78,16 +91,24 @@ def _kept_attributes(element: ElementTree.Element) -> Iterator[tuple[str, str]]:
 def _local_href(element: str, value: str) -> str:
     if value.strip().startswith("#") or (element == "image" and _EMBEDDED.fullmatch(value.strip())):
         return value.strip()
-    raise RefusedError(f"the SVG refers to another file: {value[:80]!r}. Embed its images when you save it")
+    raise RefusedError(
+        say(
+            "svg_image",
+            "the SVG refers to another file: {file}. Embed its images when you save it",
+            file=repr(value[:80]),
+        )
+    )
 
 
 def _require_local(text: str) -> None:
     """Raise RefusedError for a style or an attribute that could load something."""
     if "\\" in text or "@import" in text.lower():
-        raise RefusedError("the SVG has a style that may load another file. Save it as plain SVG")
+        raise RefusedError(say("svg_style", "the SVG has a style that may load another file. Save it as plain SVG"))
     for reference in _REFERENCE.findall(text):
         if not reference.lstrip("'\"").startswith("#"):
-            raise RefusedError(f"the SVG refers to another file: {reference!r}. Save it as plain SVG")
+            raise RefusedError(
+                say("svg_file", "the SVG refers to another file: {file}. Save it as plain SVG", file=repr(reference))
+            )
 
 
 def _name(element: ElementTree.Element) -> str:

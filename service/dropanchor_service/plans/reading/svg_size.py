@@ -4,6 +4,7 @@ import math
 import re
 from xml.etree import ElementTree
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.plans.reading.refused import RefusedError
 
 LONGER_SIDE_PX = 2000
@@ -18,7 +19,7 @@ def size_of(root: ElementTree.Element) -> tuple[int, int]:
     width, height = _length(root.get("width")), _length(root.get("height"))
     if width is None or height is None:
         if box is None:
-            raise RefusedError("the SVG has neither a viewBox nor a width and a height")
+            raise RefusedError(say("svg_size", "the SVG has neither a viewBox nor a width and a height"))
         width, height = box[2:]
     if box is None:
         root.set("viewBox", f"0 0 {width:g} {height:g}")

@@ -5,6 +5,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from xml.etree.ElementTree import Element
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.plans.reading.refused import RefusedError
 from dropanchor_service.plans.reading.svg_dashes import DASHES
 
@@ -30,7 +31,9 @@ def at_rest(style: str) -> str:
     text = _COMMENT.sub(" ", style) if "/*" in style else style
     text = _MOVING.sub("", text) if _MOVES.search(text) else text
     if _VARIABLE.search(text):
-        raise RefusedError("the SVG has a style with variables that refer to elements. Save it as PNG or PDF")
+        raise RefusedError(
+            say("svg_variables", "the SVG has a style with variables that refer to elements. Save it as PNG or PDF")
+        )
     return text
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from urllib.parse import unquote
 from xml.etree.ElementTree import Element
 
+from dropanchor_schemas.sentences import say
 from dropanchor_service.plans.reading.file_types import file_type_of
 from dropanchor_service.plans.reading.raster import open_image
 from dropanchor_service.plans.reading.refused import RefusedError
@@ -62,8 +63,12 @@ class Scales:
         """Raise RefusedError for a drawing that a page could not show."""
         if self._weight(self._root, 0).shapes > MAX_WEIGHT:
             raise RefusedError(
-                f"the SVG draws more than {MAX_WEIGHT} shapes once all that it repeats is counted (use, pattern, mask, "
-                "marker, filter). Save it as PNG or PDF"
+                say(
+                    "svg_weight",
+                    "the SVG draws more than {n} shapes once all that it repeats is counted (use, pattern, "
+                    "mask, marker, filter). Save it as PNG or PDF",
+                    n=MAX_WEIGHT,
+                )
             )
 
     def _weight(self, element: Element, depth: int) -> _Weight:
@@ -170,10 +175,12 @@ def _megapixels(element: Element) -> float:
         content = b64decode(data)
         file_type_of(content, media_type)
     except (ValueError, RefusedError) as error:
-        raise RefusedError("an image in the SVG is damaged, or not of its type. Save it as PNG or PDF") from error
+        raise RefusedError(
+            say("svg_embedded", "an image in the SVG is damaged, or not of its type. Save it as PNG or PDF")
+        ) from error
     width, height = open_image(content, media_type).size
     return width * height / 1e6
 
 
 def _too_deep() -> RefusedError:
-    return RefusedError(f"the SVG is nested more than {MAX_DEPTH} deep. Save it as PNG or PDF")
+    return RefusedError(say("svg_deep", "the SVG is nested more than {n} deep. Save it as PNG or PDF", n=MAX_DEPTH))

@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
+from dropanchor_tag_client.reminders import Reminders
 from dropanchor_tag_client.sources.bridge.measurement import Received
 
 _PORTS = {"mqtt": 1883, "mqtts": 8883, "ws": 80, "wss": 443}
@@ -85,13 +86,14 @@ class Broker:
             return None
 
     def _connect(self) -> None:
-        retry_s = _RETRY_S
+        retry_s, reminders = _RETRY_S, Reminders()
         while True:
             try:
                 self._client.connect(self._host, self._port, _KEEP_ALIVE_S)
                 return
             except (OSError, ValueError) as error:
-                self._say(f"{self._url}: {_what_to_do(error)} Still trying.")
+                if reminders.failed():
+                    self._say(f"{self._url}: {_what_to_do(error)} {reminders.words}.")
             time.sleep(retry_s)
             retry_s = min(2 * retry_s, _MAX_RETRY_S)
 

@@ -44,7 +44,7 @@ class Dropped(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """A sample of a tag. kind: "range", "imu", "heading", "bearing" or "health". fields: as in a line of `publish`."""
+    """A sample of a tag. kind: one of `KINDS`, or "health". fields: as in a line of `publish`."""
 
     tag: str
     kind: str

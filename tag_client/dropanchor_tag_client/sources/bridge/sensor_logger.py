@@ -67,6 +67,8 @@ class SensorLogger(Format):
             return
         for sensor, what in readings.damage.items():
             yield Dropped(Drop.DAMAGED, f"tag {tag}: readings of {TITLES[sensor]} {what}")
+        for pressure in readings.pressures:
+            yield Measurement(tag, "pressure", {"pressure_pa": pressure.pressure_pa, "t_ns": pressure.t_ns})
         if readings.battery_fraction is not None:
             yield Measurement(tag, "health", {"battery_fraction": readings.battery_fraction})
 

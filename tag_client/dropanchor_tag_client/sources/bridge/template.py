@@ -3,7 +3,7 @@
 [[rule]]
 topic = "plant/+/uwb"            # a filter; {1} below is what the first + stands for
 tag = "cart-{1}"                 # or "{device.id}": from the payload
-kind = "range"                   # range, imu, heading or bearing
+kind = "range"                   # range, imu, heading, bearing or pressure
 each = "anchors"                 # optional: a list or an object in the payload, or several lists of the same length.
                                  # Paths begin at each of its elements; the time and the tag may stand beside it
 time_unit = "ms"                 # of t_ns: ns, us, ms or s; without t_ns the time of arrival is used

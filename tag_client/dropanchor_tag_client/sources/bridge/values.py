@@ -19,6 +19,7 @@ _ANGLES = {"rad": 1.0, "mrad": 0.001, "deg": _DEGREE}
 _ACCELERATIONS = {"m/s2": 1.0, "m/s²": 1.0, "g": _G, "mg": _G / 1000}
 _RATES = {"rad/s": 1.0, "mrad/s": 0.001, "deg/s": _DEGREE, "dps": _DEGREE}
 _FIELDS = {"uT": 1.0, "µT": 1.0, "nT": 0.001, "mT": 1_000.0, "T": 1e6, "G": 100.0, "mG": 0.1}
+_PRESSURES = {"Pa": 1.0, "hPa": 100.0, "mbar": 100.0, "kPa": 1_000.0, "bar": 100_000.0, "inHg": 3_386.389}
 UNITS: Mapping[str, Mapping[str, float]] = {
     "range_m": _LENGTHS,
     "std_m": _LENGTHS,
@@ -28,6 +29,8 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "acc": _ACCELERATIONS,
     "gyro": _RATES,
     "mag": _FIELDS,
+    "pressure_pa": _PRESSURES,
+    "temperature_c": {"°C": 1.0, "C": 1.0},
 }
 """By field, what one of each unit is in the unit of the field."""
 

@@ -3,19 +3,22 @@
 {"messageId": 0, "sessionId": "…", "deviceId": "…", "payload": [{"name": "gyroscope", "time": 1698501144401773000,
 "values": {"x": 0.1, "y": 0.0, "z": 0.0}}, …]}: the readings of one batch period of all sensors that are switched on,
 with UTC in ns. https://github.com/tszheichoi/awesome-sensor-logger/blob/main/PUSHING.md
+A barometer's values are its `pressure` in mbar and a relative altitude (UNITS.md beside it).
 """
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from dropanchor_schemas.wire import MAX_T_NS, Vector
+from dropanchor_schemas.wire import MAX_T_NS, PressureSample, Vector
 from dropanchor_tag_client.sources.phones.readings import SENSORS, PhoneError, is_measurement
 from dropanchor_tag_client.sources.phones.streams import Reading, Stream, make_stream
 
-BATTERY = "battery"
+BATTERY, BAROMETER = "battery", "barometer"
+PA_PER_MBAR = 100.0
 MAX_SESSION_ID = 128
 MAX_MESSAGE_ID = 2**53
 _NOT_NUMBERS, _TOO_LARGE = "are not numbers", "are larger than a sensor can measure"
@@ -24,7 +27,7 @@ _NOT_NUMBERS, _TOO_LARGE = "are not numbers", "are larger than a sensor can meas
 class Message(NamedTuple):
     """One batch. streams: by sensor, those of SENSORS that it has. damage: by sensor, what is wrong with readings of it
     that make no sense. damaged: how many these are. battery_fraction: the last charge of the battery in the batch; 1 is
-    full. device_id: empty without one."""
+    full. device_id: empty without one. pressures: of the barometer."""
 
     session_id: str
     message_id: int
@@ -33,6 +36,7 @@ class Message(NamedTuple):
     battery_fraction: float | None = None
     damage: Mapping[str, str] = MappingProxyType({})
     device_id: str = ""
+    pressures: tuple[PressureSample, ...] = ()
 
 
 class _DamagedError(ValueError):
@@ -54,6 +58,7 @@ def parse(body: bytes) -> Message | None:
         return None
     device_id = message.get("deviceId")
     streams, damage, damaged = _streams(payload)
+    pressures = tuple(_pressures(payload))
     return Message(
         _session_id(message),
         _message_id(message),
@@ -62,6 +67,7 @@ def parse(body: bytes) -> Message | None:
         _battery_fraction(payload),
         damage,
         device_id if isinstance(device_id, str) else "",
+        pressures,
     )
 
 
@@ -116,6 +122,18 @@ def _vector(values: Any) -> Vector:
     if not is_measurement(x, y, z):
         raise _DamagedError(_TOO_LARGE if all(map(math.isfinite, (x, y, z))) else _NOT_NUMBERS)
     return x, y, z
+
+
+def _pressures(payload: list[Any]) -> Iterator[PressureSample]:
+    """Yield the readings of the barometer that are numbers with a time."""
+    for reading in payload:
+        if not isinstance(reading, dict) or str(reading.get("name", "")).lower() != BAROMETER:
+            continue
+        values = reading.get("values")
+        pressure = values.get("pressure") if isinstance(values, dict) else None
+        with suppress(_DamagedError):
+            if isinstance(pressure, int | float) and not isinstance(pressure, bool) and math.isfinite(pressure):
+                yield PressureSample(_time(reading.get("time")), PA_PER_MBAR * pressure)
 
 
 def _battery_fraction(payload: list[Any]) -> float | None:

@@ -25,6 +25,7 @@ from dropanchor_service.security.share_links import TABLE_FILE, ShareLinks
 from dropanchor_service.store import LatestPoses
 from support.api import ask, kind_of, make_api_bench
 from support.http_server import running_server
+from support.patience import PATIENCE_S
 from support.sites import app_of_sites, make_sites
 
 
@@ -133,24 +134,24 @@ def test_the_omlox_interface_of_a_site_holds_its_tags_alone(company: Company) ->
         headers = {"authorization": f"Bearer {company.reader_of_all}"}
         base = f"/sites/{site}/omlox/v2"
         (location,) = ask(company.app, "GET", f"{base}/providers/locations?crs=local", headers=headers).json()
-        assert location["position"]["coordinates"] == [x, 0.0]
+        assert location["position"]["coordinates"] == [x, 0.0, 0.0]
     with running_server(company.app, Event()) as port:
         url = f"ws://127.0.0.1:{port}/sites/{{}}/omlox/v2/ws/socket"
         for site, secret, event in (("a", company.admin_of_a, "subscribed"), ("b", company.admin_of_a, "error")):
             with connect(url.format(site), proxy=None) as socket:
                 request = {"event": "subscribe", "topic": "location_updates", "params": {"token": secret}}
                 socket.send(json.dumps(request))
-                assert json.loads(socket.recv(timeout=10.0))["event"] == event
+                assert json.loads(socket.recv(PATIENCE_S))["event"] == event
         with connect(url.format("b"), proxy=None) as socket:
             params = {"token": company.reader_of_all, "crs": "local"}
             socket.send(json.dumps({"event": "subscribe", "topic": "location_updates", "params": params}))
-            assert json.loads(socket.recv(timeout=10.0))["event"] == "subscribed"
+            assert json.loads(socket.recv(PATIENCE_S))["event"] == "subscribed"
             company.move(7.0)
-            (location,) = json.loads(socket.recv(timeout=10.0))["payload"]
-            assert location["position"]["coordinates"] == [9.0, 0.0]
+            (location,) = json.loads(socket.recv(PATIENCE_S))["payload"]
+            assert location["position"]["coordinates"] == [9.0, 0.0, 0.0]
             company.move(-7.0)
         with connect(url.format("c"), proxy=None) as socket, pytest.raises(ConnectionClosed) as closed:
-            socket.recv(timeout=10.0)
+            socket.recv(PATIENCE_S)
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 4404
 
@@ -206,16 +207,16 @@ def test_a_web_socket_takes_samples_of_the_site_of_its_key_only(company: Company
     with running_server(company.app, Event()) as port:
         for path in ("/ingest/stream", "/sites/a/ingest/stream"):
             with connected(port, path, company.cart_of_a) as socket:
-                socket.recv(timeout=10.0)
+                socket.recv(PATIENCE_S)
                 socket.send("{}")
-                socket.recv(timeout=10.0)
+                socket.recv(PATIENCE_S)
         for path, secret in (
             ("/sites/b/ingest/stream", company.cart_of_a),
             ("/sites/a/ingest/stream", company.cart_of_no_site),
             ("/ingest/stream", company.admin_of_a),
         ):
             with connected(port, path, secret) as socket, pytest.raises(ConnectionClosed) as closed:
-                socket.recv(timeout=10.0)
+                socket.recv(PATIENCE_S)
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 4403
     assert [message[:2] for message in company.received] == [("a", "cart")] * 2

@@ -92,7 +92,7 @@ def test_a_node_tells_the_owner_and_no_client_can() -> None:
 def test_redirects_are_relative_and_lead_to_the_right_place(path: str, location: str) -> None:
     bench = make_api_bench()
     with running_server(bench.app(Path(__file__).parents[4] / "service/dropanchor_service/dashboard"), Event()) as port:
-        answer = httpx.get(f"http://127.0.0.1:{port}{path}", trust_env=False)
+        answer = httpx.get(f"http://127.0.0.1:{port}{path}", trust_env=False, verify=False)
         assert (answer.status_code, answer.headers["location"]) == (307, location)
-        followed = httpx.get(f"http://127.0.0.1:{port}{path}", trust_env=False, follow_redirects=True)
+        followed = httpx.get(f"http://127.0.0.1:{port}{path}", trust_env=False, verify=False, follow_redirects=True)
         assert followed.status_code == 200

@@ -15,7 +15,6 @@ from websockets.typing import Origin, Subprotocol
 from dropanchor_service.api.http.borders import Border, Borders, border_of
 from dropanchor_service.api.http.hosts import Hosts
 from dropanchor_service.api.http.of_cluster import SECRET, FromNodes
-from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.folder import SecurityFolder
@@ -24,8 +23,10 @@ from dropanchor_service.security.identity import Scope as AccessScope
 from dropanchor_service.security.issued import Table
 from dropanchor_service.security.own_hosts import own_hosts
 from dropanchor_service.settings.http import HttpSettings
+from dropanchor_service.store.omlox_items import OmloxItems
 from support.api import ApiBench, ask, kind_of, make_api_bench
 from support.http_server import running_server
+from support.patience import PATIENCE_S
 
 EVIL = "https://evil.example"
 MAP = "https://map.example"
@@ -144,7 +145,7 @@ def test_no_page_of_another_origin_opens_a_web_socket(path: str, with_keys: bool
                 ) as socket,
                 pytest.raises(ConnectionClosed) as closed,
             ):
-                socket.recv(timeout=10.0)
+                socket.recv(PATIENCE_S)
             assert closed.value.rcvd is not None
             assert (closed.value.rcvd.code, "cors_origins" in closed.value.rcvd.reason) == (4403, True)
 

@@ -10,18 +10,19 @@ from fastapi import FastAPI
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+from dropanchor_evaluation.reference.access_page import HOLDERS, SOCKET, allows, operations_of
+from dropanchor_evaluation.reference.export import FOLDER
 from dropanchor_schemas.shares import ShareRequest
 from dropanchor_schemas.site import RemoteSettings, StartPose, TagSettings
 from dropanchor_service.api.http.permissions import Need
-from dropanchor_service.api.omlox.items import OmloxItems
-from dropanchor_service.reference.access_page import HOLDERS, SOCKET, allows, operations_of
-from dropanchor_service.reference.export import FOLDER
 from dropanchor_service.security import api_keys, share_links
 from dropanchor_service.security.api_keys import ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
 from dropanchor_service.security.share_links import ShareLinks
+from dropanchor_service.store.omlox_items import OmloxItems
 from support.api import ApiBench, make_api_bench
 from support.http_server import running_server
+from support.patience import PATIENCE_S
 
 
 @dataclass
@@ -67,7 +68,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Asked]:
     bench.stopping.set()  # a stream ends after its first event
     with (
         running_server(app, bench.stopping) as port,
-        httpx.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False, timeout=30.0) as client,
+        httpx.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False, verify=False) as client,
     ):
         yield Asked(app, secrets, client, bench)
 
@@ -100,7 +101,7 @@ def _opens(asked: Asked, path: str, has: Need) -> bool:
         try:
             if "omlox" in path:
                 socket.send(json.dumps({"event": "subscribe", "topic": "proximity_updates"}))
-            return bool(json.loads(socket.recv(timeout=10.0)).get("event") != "error")
+            return bool(json.loads(socket.recv(PATIENCE_S)).get("event") != "error")
         except ConnectionClosed as closed:
             return closed.rcvd is not None and closed.rcvd.code not in (4401, 4403)
 
@@ -126,10 +127,11 @@ def test_a_new_route_is_not_open_to_links(asked: Asked) -> None:
 
 
 def test_the_page_has_a_column_for_each_credential_and_a_row_for_each_request(asked: Asked) -> None:
-    text = (FOLDER / "access.md").read_text(encoding="utf-8")
+    text = (FOLDER / "reference" / "access.md").read_text(encoding="utf-8")
     assert "| request | none | key of a tag | link to tags | link | `read` | `write` | `admin` |" in text
     rows = [line for line in text.splitlines() if line.startswith("| `")]
     assert len(rows) == len(operations_of(asked.app))
     assert "| `GET /api/v1/tags/{tag}/settings` |  |  |  |  | ✓ | ✓ | ✓ |" in rows
     assert "| `GET /api/v1/destinations` |  |  |  |  | ✓ | ✓ | ✓ |" in rows
+    assert "| `PUT /api/v1/receiver-networks/{network}` |  |  |  |  |  |  | ✓ |" in rows
     assert "| `GET /api/v1/shares` |  |  |  |  |  |  | ✓ |" in rows

@@ -1,17 +1,24 @@
 """A real uvicorn on loopback, and clients that misbehave."""
 
+import asyncio
+import gc
 import socket
 import statistics
 import time
 from contextlib import closing
+from threading import Event
+from typing import Any
 
 import pytest
+from starlette.types import Receive, Scope, Send
 
 from dropanchor_service.api.app import MAX_BODY_BYTES
 from dropanchor_service.api.http.limits import GuardedProtocol
-from dropanchor_service.api.http.server import ListenError, listen
+from dropanchor_service.api.http.open_sockets import Listener
+from dropanchor_service.api.http.server import ListenError, build_server, listen
 from support.api import make_api_bench
-from support.event_stream import TIMEOUT_S, get, serving, streaming
+from support.event_stream import get, serving, streaming
+from support.patience import PATIENCE_S
 
 
 class ShortDeadlines(GuardedProtocol):
@@ -25,7 +32,7 @@ class LongDeadlines(GuardedProtocol):
 
 
 def _connected(port: int, *sent: bytes) -> socket.socket:
-    client = socket.create_connection(("127.0.0.1", port), timeout=TIMEOUT_S)
+    client = socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S)
     for data in sent:
         client.sendall(data)
     return client
@@ -43,7 +50,7 @@ def _answer(client: socket.socket) -> bytes:
 
 def _ended(client: socket.socket) -> bool:
     """Read until the server has closed the connection; fail when it stays open."""
-    end_s = time.monotonic() + TIMEOUT_S
+    end_s = time.monotonic() + PATIENCE_S
     try:
         while client.recv(65536):
             assert time.monotonic() < end_s, "the connection is still open"
@@ -170,3 +177,29 @@ def test_a_port_in_use_is_explained() -> None:
 def test_an_address_of_another_machine_is_explained() -> None:
     with pytest.raises(ListenError, match="does not have the address"):
         listen("192.0.2.1", 0)
+
+
+async def _app_without_a_page(_scope: Scope, _receive: Receive, _send: Send) -> None: ...
+
+
+def test_a_connection_that_is_accepted_while_the_server_stops_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    bound, accept = listen("127.0.0.1", 0), Listener.accept
+    server = build_server(_app_without_a_page, Event())
+
+    async def serve_until_the_first() -> None:
+        accepted = asyncio.Event()
+
+        def accept_and_stop(listener: Listener) -> tuple[socket.socket, Any]:
+            opened = accept(listener)
+            accepted.set()  # wakes the server before asyncio makes a transport of what it has accepted
+            return opened
+
+        monkeypatch.setattr(Listener, "accept", accept_and_stop)
+        monkeypatch.setattr(server, "main_loop", accepted.wait)
+        await server.serve(sockets=[bound])
+
+    bound.listen()
+    with _connected(bound.getsockname()[1]) as client:
+        asyncio.run(serve_until_the_first())
+        assert _ended(client)
+    gc.collect()  # warns of a transport that nobody closed

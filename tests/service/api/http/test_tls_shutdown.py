@@ -18,9 +18,9 @@ from dropanchor_service.api.http.limits import GuardedProtocol
 from dropanchor_service.api.http.server import Server, build_server, listen
 from dropanchor_service.security.certificate import Certificate
 from support.certificate import self_signed
+from support.patience import PATIENCE_S
 from support.zenoh_router import wait_until
 
-TIMEOUT_S = 20.0
 REQUEST = b"GET / HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n"
 
 
@@ -69,7 +69,7 @@ def serving(folder: Path, protocol: type[GuardedProtocol] = GuardedProtocol) -> 
         yield found
     finally:
         server.ask_to_stop()
-        thread.join(TIMEOUT_S)
+        thread.join(PATIENCE_S)
         assert not thread.is_alive()
 
 
@@ -78,7 +78,7 @@ def stuck_client(served: TlsServer) -> Iterator[None]:
     """Ask for the response, and do not read it once the server waits for its client."""
     context = ssl.create_default_context()
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
-    plain = socket.create_connection(("127.0.0.1", served.port), timeout=TIMEOUT_S)
+    plain = socket.create_connection(("127.0.0.1", served.port), timeout=PATIENCE_S)
     with closing(context.wrap_socket(plain)) as client:
         client.sendall(REQUEST)
         wait_until(lambda: any(one.transport.is_closing() for one in served.protocols))
@@ -98,5 +98,5 @@ def test_a_connection_that_was_closed_twice_is_left_alone(tmp_path: Path) -> Non
         protocol.loop.call_soon_threadsafe(protocol.transport.close)
         fired = threading.Event()
         protocol.loop.call_soon_threadsafe(protocol.loop.call_later, 2 * ShortDeadlines.stalled_s, fired.set)
-        assert fired.wait(TIMEOUT_S)
+        assert fired.wait(PATIENCE_S)
         assert served.errors == []

@@ -1,11 +1,12 @@
 """Check with schemathesis that the omlox interface follows its own OpenAPI document."""
 
 import pytest
-from fastapi import FastAPI
 from schemathesis.specs.openapi.checks import positive_data_acceptance
 
-from support.contract import assert_follows_the_document, operations_of
+from dropanchor_service.api.export import omlox_document
+from support.contract import Operation, assert_follows_the_document, operations_of
 from support.events import circle
+from support.interface_document import operation_ids
 from support.omlox import OmloxBench
 
 REFUSES_VALID = (
@@ -20,17 +21,18 @@ REFUSES_VALID = (
 GeoJSON is never `local`. Beside these, whatever names an object may name one that does not exist."""
 
 
-def app() -> FastAPI:
+NAMES = list(operation_ids(omlox_document()))
+
+
+@pytest.fixture(scope="module")
+def operations() -> dict[str, Operation]:
     bench = OmloxBench()
     bench.poses.move("tag-1", "a")
     bench.zones.put(circle("dock"))
-    return bench.app
+    return operations_of(bench.app, "/omlox/v2/openapi.json", NAMES)
 
 
-OPERATIONS = operations_of(app(), "/omlox/v2/openapi.json")
-
-
-@pytest.mark.parametrize("name", OPERATIONS)
-def test_every_response_follows_the_document(name: str) -> None:
-    may_refuse = name in REFUSES_VALID or "{" in OPERATIONS[name].path or name.startswith("put_")
-    assert_follows_the_document(OPERATIONS[name], [positive_data_acceptance] if may_refuse else [])
+@pytest.mark.parametrize("name", NAMES)
+def test_every_response_follows_the_document(name: str, operations: dict[str, Operation]) -> None:
+    may_refuse = name in REFUSES_VALID or "{" in operations[name].path or name.startswith("put_")
+    assert_follows_the_document(operations[name], [positive_data_acceptance] if may_refuse else [])

@@ -43,7 +43,7 @@ def test_a_subscription_brings_each_new_location_as_an_object(bench: OmloxBench,
     assert (message["event"], message["topic"]) == ("message", "location_updates")
     (location,) = message["payload"]
     Location.model_validate(location)
-    assert (location["provider_id"], location["position"]["coordinates"]) == ("tag-2", [2.0, 0.0])
+    assert (location["provider_id"], location["position"]["coordinates"]) == ("tag-2", [2.0, 0.0, 0.0])
 
 
 def test_a_place_that_is_not_known_is_never_sent(bench: OmloxBench, socket: Socket) -> None:
@@ -265,3 +265,14 @@ def bench_id(bench: OmloxBench, tag: str) -> str:
     """Return the id of the trackable of a tag, which may be new."""
     bench.poses.answers.tags.register(tag)
     return bench.id_of(tag)
+
+
+def test_what_is_retracted_comes_as_its_opposite(bench: OmloxBench, socket: Socket) -> None:
+    bench.zones.put(circle("dock"))
+    socket.subscribe("fence_events")
+    retracted = {"retracts": "5f0c1bb0c6a04f0f8f5a3c1a0c6d2e11", "reason": "start_denied"}
+    for kind in (EventType.ZONE_DWELL, EventType.ZONE_ENTER):
+        happen(bench, "a", kind=EventType.EVENT_RETRACTED, retracted_type=kind.value, **retracted)
+    (event,) = socket.next()["payload"]
+    assert event["event_type"] == "region_exit"
+    assert event["properties"]["dropanchor"]["retracts"] == "5f0c1bb0-c6a0-4f0f-8f5a-3c1a0c6d2e11"

@@ -8,7 +8,7 @@ from uuid import uuid4
 import pytest
 
 from dropanchor_schemas.zones import Polygon, Zone
-from dropanchor_service.api.omlox.models import Fence
+from dropanchor_service.store.omlox_models import Fence
 from support.api import ask
 from support.events import circle
 from support.omlox import BARE, OmloxBench

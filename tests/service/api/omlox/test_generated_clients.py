@@ -13,6 +13,7 @@ import pytest
 from support.events import circle
 from support.node_packages import install
 from support.omlox import OmloxBench
+from support.patience import PATIENCE_S
 
 GENERATOR = "openapi_python_client"
 NODE_PACKAGES = ("openapi-typescript@7.13.0", "openapi-fetch@0.17.0", "typescript@5.9.3")
@@ -78,7 +79,7 @@ def generated_python(file: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
         [*command, "--output-path", str(package), "--meta", "none", "--fail-on-warning"],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE_S,
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
@@ -131,9 +132,9 @@ def test_a_generated_typescript_client_reads_and_follows_the_hub(bench: OmloxBen
             seen = json.loads(client.stdout.readline())
             bench.poses.move("tag-1", x=6.0)
             moved = json.loads(client.stdout.readline())
-            assert client.wait(20) == 0
+            assert client.wait(PATIENCE_S) == 0
     assert seen["own"]["location_providers"] == ["tag-1"]
-    assert seen["coordinates"] == [5.0, 2.0]
+    assert seen["coordinates"] == [5.0, 2.0, 0.0]
     assert (seen["error"]["code"], seen["error"]["type"]) == (404, "urn:dropanchor:problem:no-location")
     assert len(seen["fences"]) == 1
     assert moved == {"moved": seen["own"]["id"]}
@@ -141,6 +142,6 @@ def test_a_generated_typescript_client_reads_and_follows_the_hub(bench: OmloxBen
 
 def run(folder: Path, program: Path, *arguments: str) -> None:
     done = subprocess.run(
-        [str(program), *arguments], cwd=folder, capture_output=True, text=True, timeout=120, check=False
+        [str(program), *arguments], cwd=folder, capture_output=True, text=True, timeout=PATIENCE_S, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr

@@ -8,8 +8,8 @@ import pytest
 
 from dropanchor_schemas.pose import TrackingState
 from dropanchor_service.api.omlox.models import Location, TrackableMotion, Zone
-from dropanchor_service.estimation.columns import Frame, State, StateReason
-from support.omlox import BARE, OmloxBench
+from dropanchor_service.estimation.columns import Frame, HeightSource, State, StateReason
+from support.omlox import BARE, YARD, OmloxBench
 
 COV = np.diag([0.04, 0.01, 0.0004])
 
@@ -24,7 +24,7 @@ def test_a_tag_whose_place_is_known_has_a_location_in_degrees_or_metres() -> Non
     Location.model_validate(on_earth)
     assert on_earth["position"]["coordinates"] == pytest.approx([pose["lon"], pose["lat"]], abs=1e-9)
     assert (on_earth["crs"], local["crs"]) == ("EPSG:4326", "local")
-    assert local["position"] == {"type": "Point", "coordinates": [20.0, -5.0]}
+    assert local["position"] == {"type": "Point", "coordinates": [20.0, -5.0, 0.0]}
     assert local["timestamp_generated"] == "2027-01-15T08:00:00.000Z"
     assert local["accuracy"] == pytest.approx(pose["ellipse_95"]["semi_major_m"], abs=1e-3)
     assert local["true_heading"] == pytest.approx((90 - math.degrees(0.5 + 0.3)) % 360, abs=0.01)
@@ -34,6 +34,19 @@ def test_a_tag_whose_place_is_known_has_a_location_in_degrees_or_metres() -> Non
     properties = local["properties"]
     assert (properties["state"], properties["reason"], properties["frame"]) == ("tracking", "resolved", "site")
     assert properties["covariance"] == COV.tolist()
+
+
+def test_a_location_has_the_height_in_the_frame_of_the_site_and_on_earth_where_the_altitude_is_known() -> None:
+    assert YARD.georeference is not None
+    on_a_hill = YARD.model_copy(update={"georeference": YARD.georeference.model_copy(update={"alt_m": 34.5})})
+    for site, on_earth in ((on_a_hill, 37.75), (YARD, None)):
+        bench = OmloxBench(site)
+        bench.poses.move("tag-1", x=1.0, y=2.0, z=3.25, z_std=0.25, z_source=HeightSource.PRESSURE)
+        local = Location.model_validate(bench.get("providers/tag-1/location", crs="local"))
+        assert (local.position.coordinates, local.elevation_ref) == ([1.0, 2.0, 3.25], None)
+        location = Location.model_validate(bench.get("providers/tag-1/location"))
+        assert location.position.coordinates[2:] == ([] if on_earth is None else [on_earth])
+        assert location.elevation_ref == (None if on_earth is None else "wgs84")
 
 
 @pytest.mark.parametrize("heading", [math.nan])
@@ -111,7 +124,7 @@ def test_without_a_georeference_everything_is_local_and_degrees_are_refused() ->
     bench = OmloxBench(BARE)
     bench.poses.move("tag-1", x=7.0, y=8.0)
     location = bench.get("providers/tag-1/location")
-    assert (location["crs"], location["position"]["coordinates"]) == ("local", [7.0, 8.0])
+    assert (location["crs"], location["position"]["coordinates"]) == ("local", [7.0, 8.0, 0.0])
     (zone,) = bench.get("zones/summary")
     assert zone["incomplete_configuration"] is True
     assert "ground_control_points" not in zone

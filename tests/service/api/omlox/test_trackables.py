@@ -6,9 +6,9 @@ from uuid import uuid4
 
 import pytest
 
-from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
+from dropanchor_service.store.omlox_items import OmloxItems
 from support.api import ask, kind_of
 from support.omlox import OmloxBench
 

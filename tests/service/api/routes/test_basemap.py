@@ -10,7 +10,7 @@ from pmtiles.tile import Compression, TileType
 
 from dropanchor_service.api.http.permissions import Need, need_of
 from dropanchor_service.basemap.basemap import ServedBasemap
-from dropanchor_service.basemap.file import UnreadableTileError
+from dropanchor_service.basemap.errors import UnreadableTileError
 from support.api import ask, kind_of, make_api_bench
 from support.basemap_files import basemap_file, image_tile, vector_tile
 

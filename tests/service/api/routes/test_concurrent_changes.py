@@ -107,3 +107,15 @@ def test_a_client_learns_what_it_may_do(tmp_path: Path) -> None:
     for scope in Scope:
         headers = {"authorization": f"Bearer {keys.add(scope.word, scope)}"}
         assert ask(app, "GET", "/api/v1/access", headers=headers).json() == {"scope": scope.word}
+
+
+def test_a_deleted_tag_gets_its_settings_back_unless_somebody_has_set_others() -> None:
+    bench = make_api_bench()
+    app = bench.app()
+    for path in ("/api/v1/tags/cart", "/api/v1/tags/van"):
+        ask(app, "PUT", f"{path}/settings", json={"name": "Old"})
+        left = ask(app, "DELETE", path).headers["etag"]
+        if path.endswith("van"):
+            ask(app, "PUT", f"{path}/settings", json={"name": "Theirs"})
+        ask(app, "PUT", f"{path}/settings", json={"name": "Old"}, headers={"if-match": left})
+    assert [bench.answers.site.tag_settings(tag).name for tag in ("cart", "van")] == ["Old", "Theirs"]

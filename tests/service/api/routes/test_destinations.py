@@ -11,8 +11,8 @@ import pytest
 
 from dropanchor_service.api.http.permissions import Need, need_of
 from dropanchor_service.api.routes import event_examples as examples
-from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.delivery.channels import Channels
+from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.delivery.registry import FILE_NAME, WEBHOOKS_FILE_NAME, open_destinations
 from dropanchor_service.delivery.write_only import shown_url
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
@@ -30,7 +30,7 @@ def webhook(**changes: Any) -> dict[str, Any]:
 
 
 def with_loopback(folder: Path | None = None, email: EmailSettings | None = None) -> EventParts:
-    delivery = DeliverySettings(allow_networks=(ipaddress.ip_network("127.0.0.0/8"),), timeout_s=2.0)
+    delivery = DeliverySettings(allow_networks=(ipaddress.ip_network("127.0.0.0/8"),), timeout_s=60.0)
     channels = Channels(delivery, email or EmailSettings(), MqttSettings())
     return replace(EventParts.in_memory("yard"), channels=channels, destinations=open_destinations(folder))
 
@@ -46,6 +46,14 @@ def test_a_webhook_never_returns_its_secret_and_keeps_it(tmp_path: Path) -> None
     kept = open_destinations(tmp_path).all["mes"].model_dump()
     assert (kept["secret"], kept["tags"]) == (SECRET, ["a"])
     assert (tmp_path / FILE_NAME).stat().st_mode & 0o077 == 0
+
+
+def test_the_list_says_what_the_settings_lack_before_anybody_fills_a_form() -> None:
+    lacking = ask(app_of(with_loopback()), "GET", "/api/v1/destinations").json()["unavailable"]
+    assert lacking == {
+        "email": "an e-mail needs a mail server: set `server` in `[email]` of the settings.",
+        "mqtt": "MQTT needs a broker: set `server` in `[mqtt]` of the settings.",
+    }
 
 
 URL = "http://127.0.0.1:9/services/T0/xoxb-token?key=abc"
@@ -109,7 +117,7 @@ def test_webhooks_of_an_older_service_become_destinations(tmp_path: Path) -> Non
         (webhook(url="ftp://example.com/"), "https://"),
         (webhook(url="https://me:word@example.com/"), "password"),
         (webhook(secret=None), "needs a secret"),
-        (webhook(secret="whsec_c2hvcnQ="), "openssl"),
+        (webhook(secret="whsec_c2hvcnQ="), "(New secret)"),
         ({"id": "mes", "type": "email", "to": ["shift@example.com"]}, "`[email]`"),
         ({"id": "mes", "type": "mqtt"}, "`[mqtt]`"),
     ],

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dropanchor_schemas.explain import Explanation
+from dropanchor_schemas.explain import Explanation, RangeErrors
 from dropanchor_schemas.pose import Pose
 from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, State
 from support.api import T_NS, ApiBench, ask, kind_of, make_api_bench
@@ -92,6 +92,7 @@ def explained_house() -> ApiBench:
     records["t_ns"] = T_NS - np.arange(60)[::-1] * SECOND // 10
     records["predicted"] = 10.0 + 2.0 * (records["t_ns"] - T_NS) * 1e-9
     records["innovation"], records["S"], records["p_outlier"], records["fused"] = 0.1, 0.04, 0.02, True
+    records["white_std"], records["lasting_std"] = 0.25, 0.5
     records["innovation"][-1], records["p_outlier"][-1], records["fused"][-1] = 3.0, 0.99, False
     records["measured"] = np.add(records["predicted"], records["innovation"])
     pose = np.zeros(1, POSE)
@@ -108,6 +109,7 @@ def test_an_explanation_holds_the_last_innovations_and_the_range_rate() -> None:
     assert (last.kind, last.anchor, last.fused, last.p_outlier) == ("range", "17", False, 0.99)
     assert last.nis == pytest.approx(9.0 / 0.04)
     assert explanation.refused == 1
+    assert explanation.range_errors == RangeErrors(white_m=0.25, lasting_m=0.5)
     assert explanation.speed.predicted_range_rate_mps == pytest.approx(2.0)
     assert explanation.speed.range_rate_mps == pytest.approx(2.2, abs=0.3)
     assert len(explanation.speed_track.t_ns) == len(explanation.speed_track.speed_mps) >= 20
@@ -119,11 +121,12 @@ def test_an_innovation_that_was_only_gated_has_no_outlier_probability() -> None:
     bench = make_api_bench()
     bench.move("a")
     record = np.zeros(1, INNOVATION)
-    record["S"], record["p_outlier"] = 1.0, np.nan
+    record["S"], record["p_outlier"], record["white_std"] = 1.0, np.nan, np.nan
     pose = bench.answers.latest.since()[1]
     bench.answers.latest.write(pose, np.empty(0, HYPOTHESIS), record)
     explanation = Explanation.model_validate(ask(bench.app(), "GET", "/api/v1/tags/a/explain").json())
     assert explanation.innovations[0].p_outlier is None
+    assert explanation.range_errors is None
 
 
 @pytest.mark.parametrize("query", ["last=0", "last=301", "last=x", "first=3"])

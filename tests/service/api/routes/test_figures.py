@@ -10,7 +10,7 @@ from fastapi import FastAPI
 
 from dropanchor_schemas.figures import Figures
 from dropanchor_schemas.site import TagSettings
-from dropanchor_service.api.routes.event_parts import EventParts
+from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.estimation.columns import State
 from dropanchor_service.events.drafts import StateKey, States, StateValue, Stay
 from dropanchor_service.security import api_keys, share_links

@@ -11,6 +11,7 @@ import pytest
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.api.routes.page_bundle import PROGRAMS, BundleError, bundle
 from support.api import ask, make_api_bench
+from support.patience import PATIENCE_S
 
 
 def write(folder: Path, **modules: str) -> None:
@@ -38,7 +39,7 @@ def test_a_bundle_does_what_its_modules_do(tmp_path: Path, is_bundled: bool) -> 
     if is_bundled:
         (tmp_path / "main.js").write_text(bundle(tmp_path, "main.js"))
     (tmp_path / "package.json").write_text('{"type": "module"}')
-    done = subprocess.run(["node", "main.js"], cwd=tmp_path, check=True, capture_output=True, timeout=60)
+    done = subprocess.run(["node", "main.js"], cwd=tmp_path, check=True, capture_output=True, timeout=PATIENCE_S)
     assert json.loads(done.stdout) == ["lib", "main", 1, 8, "object", 7, "far/x"]
 
 

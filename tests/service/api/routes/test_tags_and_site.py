@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dropanchor_schemas.answers import NewcomerList, TagList, TagStatus
+from dropanchor_schemas.answers import NewcomerList, PendingTagList, TagList, TagStatus
 from dropanchor_schemas.site import Anchor, Site, TagSettings
 from dropanchor_schemas.wire import Reason
 from support.api import ask, kind_of, make_api_bench
@@ -33,11 +33,13 @@ def test_the_list_of_tags_includes_those_that_have_sent_nothing() -> None:
     assert [(tag.tag, tag.first_heard_ns) for tag in tags] == [("b", None), ("a", None)]
 
 
-def test_newcomers_are_listed_with_the_latest_sender_first() -> None:
+def test_pending_tags_are_listed_with_the_latest_sender_first() -> None:
     bench = make_api_bench()
     for name, t_ns in (("a", 10), ("b", 20), ("a", 30)):
         bench.answers.pending_tags.on_message(name, t_ns)
-    listed = NewcomerList.model_validate(ask(bench.app(), "GET", "/api/v1/newcomers").json()).newcomers
+    app = bench.app()
+    listed = PendingTagList.model_validate(ask(app, "GET", "/api/v1/pending-tags").json()).tags
+    assert NewcomerList.model_validate(ask(app, "GET", "/api/v1/newcomers").json()).newcomers == listed
     assert [(n.tag, n.first_heard_ns, n.last_heard_ns, n.messages) for n in listed] == [
         ("a", 10, 30, 2),
         ("b", 20, 20, 1),

@@ -10,6 +10,7 @@ from dropanchor_schemas.times import ns_of_iso
 from dropanchor_service.answers.times import iso_utc
 from dropanchor_service.history.storage import Retention
 from support.api import T_NS, ask, kind_of, make_api_bench
+from support.interface_document import DOCUMENT
 
 T_UTC = "2027-01-15T08:00:00.000000000Z"
 
@@ -56,7 +57,7 @@ def test_events_are_asked_for_from_an_iso_time_on(since: str) -> None:
 
 TIME_PARAMETERS = [
     f"{path}?{name}="
-    for path in ("tags/a/track", "tags/a/track/file", "tracks", "heat-map", "figures")
+    for path in ("tags/a/track", "tags/a/track/file", "tracks", "heat-map", "figures", "history/coverage")
     for name in ("from", "to")
 ] + ["tags/a/pose?at=", "events?since="]
 
@@ -76,10 +77,9 @@ def test_every_time_parameter_takes_iso_and_refuses_other_units(parameter: str, 
 
 
 def test_every_parameter_that_takes_a_time_is_tested_here() -> None:
-    document = make_api_bench().app().openapi()
     found = {
         f"{path.removeprefix('/api/v1/').replace('{tag}', 'a')}?{parameter['name']}="
-        for path, item in document["paths"].items()
+        for path, item in DOCUMENT["paths"].items()
         for operation in item.values()
         for parameter in operation.get("parameters", [])
         if "date-time" in str(parameter["schema"])

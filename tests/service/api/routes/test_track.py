@@ -8,10 +8,11 @@ from xml.etree import ElementTree
 
 import pytest
 
+from dropanchor_schemas.geojson import TrackFeatureCollection
 from dropanchor_schemas.pose import Pose
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_schemas.track import Track
-from dropanchor_service.estimation.columns import State
+from dropanchor_service.estimation.columns import HeightSource, State
 from dropanchor_service.history.storage import Retention
 from dropanchor_service.store import LatestPoses
 from support.api import T_NS, ApiBench, ask, kind_of, make_api_bench
@@ -20,6 +21,7 @@ SECOND = 1_000_000_000
 RETENTION = Retention(SECOND, 0.1, 5 * SECOND, 10**18, 2**40)
 GEOREFERENCED = Site(anchors=[Anchor(id="17")], georeference=Georeference(lat=52.5, lon=13.4))
 SECONDS = 600
+GPX = "{http://www.topografix.com/GPX/1/1}"
 
 
 def driven(folder: Path, site: Site | None = None) -> ApiBench:
@@ -81,7 +83,7 @@ def test_geojson_and_gpx_need_a_georeference(tmp_path: Path, form: str) -> None:
 def test_gpx_and_geojson_hold_geographic_coordinates(tmp_path: Path) -> None:
     bench = driven(tmp_path, GEOREFERENCED)
     gpx = ask(bench.app(), "GET", "/api/v1/tags/a/track?format=gpx")
-    points = list(ElementTree.fromstring(gpx.text).iter("{http://www.topografix.com/GPX/1/1}trkpt"))
+    points = list(ElementTree.fromstring(gpx.text).iter(f"{GPX}trkpt"))
     assert (gpx.headers["content-type"], len(points)) == ("application/gpx+xml", SECONDS + 1)
     assert points[-1][0].text == "2027-01-15T08:00:00.000Z"
     metres = (float(points[-1].attrib["lon"]) - 13.4) * math.radians(1) * 6_378_137 * math.cos(math.radians(52.5))
@@ -90,6 +92,34 @@ def test_gpx_and_geojson_hold_geographic_coordinates(tmp_path: Path) -> None:
     features = ask(bench.app(), "GET", "/api/v1/tags/a/track", headers=accept).json()["features"]
     assert features[-1]["geometry"]["coordinates"][0] == pytest.approx(float(points[-1].attrib["lon"]))
     assert features[-1]["properties"]["covariance"][0][0] == 0.04
+
+
+def test_exports_have_heights_and_altitudes_where_that_of_the_site_is_known(tmp_path: Path) -> None:
+    on_a_hill = Site(anchors=[Anchor(id="17")], georeference=Georeference(lat=52.5, lon=13.4, alt_m=34.5))
+    bench = make_api_bench(on_a_hill, tmp_path, RETENTION)
+    bench.move("a", x=1.0, z=3.25, z_std=0.25, z_source=HeightSource.PRESSURE)
+    bench.now_ns += SECOND
+    bench.move("a", x=2.0, z=math.nan, z_std=math.nan)  # stored before heights were
+    bench.write_history()
+
+    def exported(form: str) -> str:
+        window = f"from={T_NS}&to={T_NS + SECOND}"
+        return ask(bench.app(), "GET", f"/api/v1/tags/a/track?{window}&format={form}").text
+
+    points = ElementTree.fromstring(exported("gpx")).iter(f"{GPX}trkpt")
+    inside = [[child.tag.removeprefix(GPX) for child in point] for point in points]
+    assert inside == [["ele", "time", "type"], ["time", "type"]]  # in the order of the standard
+    assert "<ele>37.750</ele>" in exported("gpx")
+    features = TrackFeatureCollection.model_validate_json(exported("geojson")).features
+    heights = [feature.geometry.coordinates[2:] for feature in features if feature.geometry is not None]
+    assert heights == [[37.75], []]
+    row, empty = csv.DictReader(io.StringIO(exported("csv")))
+    names = ("z", "z_std_m", "z_source", "alt_m")
+    assert [row[name] for name in names] == ["3.25", "0.25", "pressure", "37.75"]
+    assert [empty[name] for name in names] == [""] * 4
+    (first, second) = track(bench, f"from={T_NS}&to={T_NS + SECOND}").poses
+    assert (first.z, first.z_std_m, first.z_source, first.alt_m) == (3.25, 0.25, "pressure", 37.75)
+    assert (second.z, second.z_std_m, second.z_source, second.alt_m) == (None,) * 4
 
 
 def test_gpx_leaves_out_ambiguous_poses(tmp_path: Path) -> None:

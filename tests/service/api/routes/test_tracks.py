@@ -139,7 +139,12 @@ def test_a_parquet_file_holds_every_pose_in_row_groups_with_units_and_frame(
     assert (units["x"], units["heading_rad"], units["cov_xh"], units["state"]) == ("m", "rad", "m·rad", "")
     about = file.schema_arrow.metadata
     assert (about[b"dropanchor.tag"], about[b"dropanchor.site"]) == (b"a", b"default")
-    assert json.loads(about[b"dropanchor.georeference"]) == {"lat": 52.5, "lon": 13.4, "rotation_rad": 0.0}
+    assert json.loads(about[b"dropanchor.georeference"]) == {
+        "lat": 52.5,
+        "lon": 13.4,
+        "rotation_rad": 0.0,
+        "alt_m": None,
+    }
     assert b"counter-clockwise" in about[b"dropanchor.frame"]
 
 
@@ -193,3 +198,31 @@ def test_a_damaged_history_covers_no_time(tmp_path: Path) -> None:
     for file in tmp_path.glob("history.sqlite*"):
         file.write_bytes(b"torn " * 1000)
     assert kind_of(ask(bench.app(), "GET", "/api/v1/history")) == "history-unreadable"
+
+
+def test_the_history_says_when_there_are_poses_and_when_not(tmp_path: Path) -> None:
+    bench = make_api_bench(folder=tmp_path, retention=RETENTION)
+    path = "/api/v1/history/coverage"
+    empty = {"from_ns": None, "to_ns": None, "step_ns": 10 * SECOND}
+    assert ask(bench.app(), "GET", path).json() == {**empty, "stretches": []}
+    for seconds in (0, 10, 20, 500, 86_400):
+        bench.move("a", x=1.0, t_ns=T_NS + seconds * SECOND)
+    bench.write_history()
+    found = ask(bench.app(), "GET", f"{path}?to={T_NS + 600 * SECOND}").json()
+    assert found["step_ns"] == 10 * SECOND
+    assert [[(t - T_NS) // SECOND for t in each.values()] for each in found["stretches"]] == [[0, 30], [500, 510]]
+    whole = ask(bench.app(), "GET", f"{path}?max_parts=2&from=0").json()
+    assert len(whole["stretches"]) == 1  # parts of many years
+    assert whole["stretches"][0]["from_ns"] <= T_NS < whole["stretches"][0]["to_ns"]
+    nothing = ask(bench.app(), "GET", f"{path}?from={T_NS - 900 * SECOND}&to={T_NS - 60 * SECOND}").json()
+    assert nothing["stretches"] == []
+    for query in (f"from={T_NS + 10**6 * SECOND}", f"to={T_NS - 60 * SECOND}"):  # after the last pose, before the first
+        outside = ask(bench.app(), "GET", f"{path}?{query}").json()
+        assert outside["stretches"] == []
+        assert outside["from_ns"] == outside["to_ns"]
+    for query in ("from=2&to=1", "max_parts=0", "max_parts=1001", "parts=3"):
+        assert kind_of(ask(bench.app(), "GET", f"{path}?{query}")) == "invalid-request"
+    assert kind_of(ask(make_api_bench().app(), "GET", path)) == "no-history"
+    for file in tmp_path.glob("history.sqlite*"):
+        file.write_bytes(b"torn " * 1000)
+    assert kind_of(ask(bench.app(), "GET", path)) == "history-unreadable"

@@ -5,19 +5,19 @@ import pytest
 
 from dropanchor_schemas import StartPose, TagSettings
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.estimation.fleet.belief.heading_classes import add_own_error_class
+from dropanchor_service.estimation.fleet.belief.births.heading_classes import may_have_own_error
 from dropanchor_service.estimation.fleet.belief.heading_models import SOFT_IRON_FACTOR, reference_error
-from dropanchor_service.estimation.fleet.belief.layout import MAGNETOMETER_MODEL, PLATFORM_MODEL, make_workspace
+from dropanchor_service.estimation.fleet.belief.layout import MAGNETOMETER_MODEL, PLATFORM_MODEL
 from dropanchor_service.estimation.fleet.belief.start import choose_model
 from dropanchor_service.estimation.fleet.configure import (
-    MOUNT_KNOWN_STD,
     MOUNT_UNKNOWN_STD,
+    REFERENCE_STD,
     SLIP_KNOWN_STD,
     SLIP_UNKNOWN_STD,
     SPEED_MAX,
     configure_row,
 )
-from dropanchor_service.estimation.fleet.frontend.node import DERIVED_HEADING, NODE
+from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, DERIVED_HEADING, NODE
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from dropanchor_service.settings.engine_columns import tag_columns
 
@@ -25,6 +25,13 @@ from dropanchor_service.settings.engine_columns import tag_columns
 def row_of(settings: TagSettings) -> Array:
     row: Array = configure_row(tag_columns(settings, 0.0), Tuning())
     return row
+
+
+def may_start_with_own_error(row: Array) -> bool:
+    """Whether a tag that starts where the operator said gets a second class of heading errors."""
+    row["start"]["known"], node = 1, np.zeros(1, NODE)
+    node["heading_kind"] = DERIVED_HEADING
+    return bool(may_have_own_error(row, node[0]))
 
 
 def test_a_bias_that_is_not_calibrated_has_the_default_spread() -> None:
@@ -58,7 +65,7 @@ def test_a_tag_is_no_faster_than_the_operators_limit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("angle", "std", "kept"), [(None, None, MOUNT_UNKNOWN_STD), (0.3, None, MOUNT_KNOWN_STD), (0.3, 0.0, 0.0)]
+    ("angle", "std", "kept"), [(None, None, MOUNT_UNKNOWN_STD), (0.3, None, Tuning().mount_known_std), (0.3, 0.0, 0.0)]
 )
 def test_a_mounting_angle_is_as_certain_as_the_operators_setting(
     angle: float | None, std: float | None, kept: float
@@ -67,10 +74,10 @@ def test_a_mounting_angle_is_as_certain_as_the_operators_setting(
 
 
 def test_a_heading_set_not_to_drift_has_one_class_and_no_error_beyond_the_setting() -> None:
-    for given, classes, slow in ((None, 1, 0.03), (0.0, 0, 0.0), (0.01, 0, 0.01)):
+    for given, other_class, slow in ((None, True, 0.03), (0.0, False, 0.0), (0.01, False, 0.01)):
         rows = row_of(TagSettings(heading_std_rad=given)).reshape(1)
         rows["heading"]["model"] = PLATFORM_MODEL
-        assert add_own_error_class(make_workspace()[0]["hypotheses"], 0, 1, rows[0], Tuning(), False) == classes
+        assert may_start_with_own_error(rows[0]) == other_class
         assert reference_error(rows[0], 1.0)[1] == slow
 
 
@@ -78,7 +85,20 @@ def test_the_setting_for_a_platforms_heading_does_not_change_a_magnetic_one() ->
     rows = row_of(TagSettings(heading_std_rad=0.0)).reshape(1)
     rows["heading"]["model"] = MAGNETOMETER_MODEL
     assert reference_error(rows[0], 0.04)[1] == 0.2
-    assert add_own_error_class(make_workspace()[0]["hypotheses"], 0, 1, rows[0], Tuning(), False) == 1
+    assert may_start_with_own_error(rows[0])
+
+
+@pytest.mark.parametrize(("given", "slow"), [(None, 0.6), (0.0, 0.2), (0.15, 0.25)])
+def test_with_the_imu_as_the_source_the_setting_is_the_error_of_north(given: float | None, slow: float) -> None:
+    start = StartPose(x=1.0, y=0.0, heading_rad=0.5)
+    rows = row_of(TagSettings(heading_source="imu", heading_std_rad=given, start=start)).reshape(1)
+    node = np.zeros(1, NODE)
+    node["heading"], node["heading_kind"] = 0.7, ABSOLUTE_HEADING
+    choose_model(rows[0], node[0], Tuning())
+    assert reference_error(rows[0], 0.04)[1] == pytest.approx(slow)
+    assert may_start_with_own_error(rows[0]) == (given is None)
+    assert rows["heading"]["north"][0] == pytest.approx(0.2 if given is None else 0.0)
+    assert rows["settings"]["reference_std"][0] == (REFERENCE_STD if given is None else given)
 
 
 @pytest.mark.parametrize(("heading", "times"), [(0.5, SOFT_IRON_FACTOR), (None, 1.0)])

@@ -3,11 +3,16 @@
 Where 5 is not reached, the limit is the next one, and a comment says what it was before.
 """
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
-from dropanchor_service.evaluation.product.rows import selected, simulated_rows
-from dropanchor_service.evaluation.product.runs import sources, tag_run
-from dropanchor_service.evaluation.product.work import run_row
+from dropanchor_evaluation.product.rows import Row, selected, simulated_rows
+from dropanchor_evaluation.product.runs import sources, tag_run
+from dropanchor_evaluation.product.scores import RowScore
+from dropanchor_evaluation.product.work import run_row
+from dropanchor_tag_client.simulator.simulation import Simulation
 
 
 def worst_sigma(name: str, seed: int) -> float:
@@ -33,7 +38,7 @@ def test_a_tag_that_passes_close_to_the_anchor_keeps_its_light_hypotheses() -> N
 
 @pytest.mark.parametrize("row", ["scalar/nothing/known", "9-axis/everything/known", "6-axis/everything/unknown"])
 def test_a_tag_that_passes_the_anchor_on_a_side_that_it_does_not_know_keeps_both(row: str) -> None:
-    assert worst_sigma(f"OU/{row}", 21086) < 5.0
+    assert worst_sigma(f"OU/{row}", 21086) < 5.5  # 5.4 with nothing told
 
 
 def test_a_tag_with_fast_ranges_is_not_found_before_it_moves() -> None:
@@ -83,3 +88,36 @@ def test_a_light_hypothesis_drives_off_backwards_too() -> None:
 @pytest.mark.parametrize(("motion", "seed"), [("C5", 5187), ("C5", 5141), ("rolling", 5192), ("rolling", 5157)])
 def test_a_place_with_rivals_is_not_tracked(motion: str, seed: int) -> None:
     assert worst_sigma(f"{motion}/9-axis/nothing/known", seed) < 5.0
+
+
+@pytest.mark.parametrize("what", ["S5+white1", "S5+lasting0.5", "C5+white1", "C5+lasting0.5", "C5+mean10"])
+def test_ranges_that_are_worse_than_anybody_said_widen_the_ellipse(what: str) -> None:
+    result = run_of(Row(what, "9-axis", "nothing", "known"), range(5000, 5008))
+    assert result.coverage > 0.9  # 0.57 where errors of 0.5 m last, while the noise of ranges was assumed
+    assert result.worst_sigma < 5.0  # to 75
+
+
+@pytest.mark.parametrize("degrees", [90, 135, 180])
+@pytest.mark.parametrize("start", ["known", "unknown"])
+def test_a_tag_on_a_smooth_trolley_may_be_mounted_any_way_round(degrees: int, start: str) -> None:
+    result = run_of(Row(f"rolling+mount{degrees}", "9-axis", "nothing", start), range(5000, 5004))
+    assert result.worst_sigma < 7.0  # 6.0 once; to 136 while a mount within 2 rad of straight was assumed
+
+
+def run_of(row: Row, seeds: range) -> RowScore:
+    return run_row(row, [tag_run(row, run) for run in sources(row, seeds)]).score
+
+
+@pytest.mark.parametrize("seed", [5001, 5002])
+def test_a_platform_without_accelerations_is_found_since_its_heading_points_ahead(seed: int) -> None:
+    (row,) = selected(simulated_rows(), ["C5/scalar/nothing/unknown"])
+    (source,) = sources(row, range(seed, seed + 1))
+    assert isinstance(source, Simulation)
+    run = tag_run(row, source)
+    headings = run.samples.headings.copy()
+    headings["heading"] += np.angle(np.exp(1j * (source.truth.course - source.truth.heading)).mean())
+    samples = replace(run.samples, imu=run.samples.imu[:0], headings=headings)
+    score = run_row(row, [replace(run, samples=samples)]).tags[0]
+    assert score.tracking_share > 0.5
+    assert score.second_half < 1.0
+    assert score.worst_sigma < 5.0

@@ -2,9 +2,9 @@
 
 import pytest
 
-from dropanchor_service.evaluation.product.rows import Row
-from dropanchor_service.evaluation.product.runs import sources, tag_run
-from dropanchor_service.evaluation.product.work import run_row
+from dropanchor_evaluation.product.rows import Row
+from dropanchor_evaluation.product.runs import sources, tag_run
+from dropanchor_evaluation.product.work import run_row
 from support.recordings import recording_or_skip
 
 pytestmark = pytest.mark.recordings

@@ -15,6 +15,7 @@ from support.certificate import self_signed
 from support.listening import ReceivedFrames, listening
 from support.mosquitto import mosquitto, needs_mosquitto
 from support.mqtt_bridge import bridge, field_or_skip, publish, wait_for_line
+from support.patience import PATIENCE_S
 from support.zenoh_router import wait_until
 
 pytestmark = needs_mosquitto
@@ -146,7 +147,7 @@ def test_a_flood_of_bad_payloads_is_told_once_per_second(router_endpoint: str, t
         publish(client, "dwm/node/bad/uplink/data", b"{")
         wait_for_line(process, "left out: not_json")
         process.terminate()
-        _, rest = process.communicate(timeout=30)
+        _, rest = process.communicate(timeout=PATIENCE_S)
     assert rest.count("left out: not_json") <= time.monotonic() - began_s + 2
 
 

@@ -108,3 +108,12 @@ def test_times_are_read(tmp_path: Path, options: str, time: object, t_ns: int) -
 )
 def test_a_time_that_is_none_is_named(tmp_path: Path, time: object, why: str) -> None:
     assert why in why_not(tmp_path, "", {"m": 1.0, "t": time}, TIME)
+
+
+def test_a_barometer_is_read_in_its_own_unit(tmp_path: Path) -> None:
+    rule = '[[rule]]\nkind = "pressure"\ntopic = "u"\ntag = "c"\nfields = {pressure_pa = "p", temperature_c = "t"}'
+    (tmp_path / "rule.toml").write_text(f'{rule}\nunit = {{pressure_pa = "hPa"}}')
+    payload = json.dumps({"p": 1013.25, "t": 21.5}).encode()
+    assert list(Template(tmp_path / "rule.toml").parse(Received("u", payload, 5))) == [
+        Measurement("c", "pressure", {"pressure_pa": 101_325.0, "temperature_c": 21.5, "t_ns": 5})
+    ]

@@ -16,6 +16,7 @@ from support import module_strings as said
 from support.commands import start_python
 from support.listening import ReceivedFrames, listening
 from support.module_strings import EXAMPLES, Pairs
+from support.patience import PATIENCE_S
 from support.pattern_strings import PATTERN_EXAMPLES
 from support.serial_module import Answer, SerialModule, dwm1001_shell, plugged_in, talkative
 from support.zenoh_router import wait_until
@@ -33,7 +34,7 @@ def serial(endpoint: str, module: SerialModule, *arguments: str) -> Iterator[sub
         yield process
     finally:
         process.terminate()
-        process.communicate(timeout=30)
+        process.communicate(timeout=PATIENCE_S)
 
 
 def ranges(received: ReceivedFrames) -> list[tuple[int, float]]:
@@ -128,7 +129,7 @@ def test_nonsense_ends_nothing_and_is_logged_at_most_once_per_second(router_endp
         assert process.poll() is None
         took_s = time.monotonic() - began
         process.terminate()
-        _, errors = process.communicate(timeout=30)
+        _, errors = process.communicate(timeout=PATIENCE_S)
     lines = errors.splitlines()
     assert 2 <= len(lines) <= took_s + 2
     assert any("left out" in line and "damaged" in line for line in lines)

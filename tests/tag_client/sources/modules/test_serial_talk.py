@@ -11,6 +11,7 @@ from dropanchor_schemas.wire import anchor_number
 from support import module_strings as said
 from support.commands import start_python
 from support.listening import listening
+from support.patience import PATIENCE_S
 from support.pattern_strings import DW1000, QM33
 from support.serial_module import Answer, plugged_in, talkative
 from support.zenoh_router import wait_until
@@ -29,7 +30,7 @@ def heard(
             text = read_until(process, sentence, wait_s)
         finally:
             process.terminate()
-            rest = process.communicate(timeout=30)[1]
+            rest = process.communicate(timeout=PATIENCE_S)[1]
     return text + rest
 
 
@@ -82,7 +83,7 @@ def test_the_suggested_pattern_gives_ranges(router_endpoint: str, tmp_path: Path
         process = start_python("-m", "dropanchor_tag_client", "serial", str(module.path), *options)
         wait_until(lambda: len(received.ranges()) >= 5)
         process.terminate()
-        process.communicate(timeout=30)
+        process.communicate(timeout=PATIENCE_S)
     assert received.ranges() == pytest.approx([1.234] * len(received.ranges()))
     assert {one.anchor for frame in received.frames for one in frame.ranges} == {anchor_number("0x12")}
 
@@ -134,7 +135,7 @@ def test_an_imu_line_beside_a_range_line_is_published_in_si_units(router_endpoin
         process = start_python("-m", "dropanchor_tag_client", *command)
         wait_until(lambda: any(frame.imu for frame in received.frames) and len(received.ranges()) > 0)
         process.terminate()
-        process.communicate(timeout=30)
+        process.communicate(timeout=PATIENCE_S)
     (imu, *_) = [sample for frame in received.frames for sample in frame.imu]
     assert imu.acc == pytest.approx((0.0, -9.80665, 0.0), abs=1e-5)
     assert imu.gyro == pytest.approx((0.0, -3.14159, 0.0), abs=1e-5)

@@ -23,6 +23,7 @@ class EventFeed:
     """The events that one subscription has not received yet."""
 
     types: tuple[EventType, ...]
+    """Those of this topic. The retraction of one is sent as its opposite: the interface knows nothing else."""
 
     def __init__(self, hub: Hub, params: Params, project: Project | None = None) -> None:
         """project: returns the projection of GeoJSON; None for plain objects."""
@@ -30,7 +31,7 @@ class EventFeed:
         self._params = params
         self._project = project
         self._position = hub.events.newest
-        self._selection = Selection(types=[kind.value for kind in self.types])
+        self._selection = Selection(types=[kind.value for kind in (*self.types, EventType.EVENT_RETRACTED)])
 
     def payloads(self) -> Iterator[list[Answer]]:
         """Yield the payload of the next message, if one is due. Raises sqlite3.Error; then nothing is lost."""
@@ -47,6 +48,8 @@ class EventFeed:
     def _object(self, event: StoredEvent) -> Answer | None:
         """Return the object of an event, None if the client does not want it."""
         body = orjson.loads(event.body)
+        if body["type"] not in self.types and body["data"]["retracted_type"] not in self.types:
+            return None
         found = self._described(body, body["data"])
         return found if self._wants(found, body) else None
 
@@ -66,10 +69,12 @@ class FenceEventFeed(EventFeed):
     types = (EventType.ZONE_ENTER, EventType.ZONE_EXIT)
 
     def _described(self, body: Any, data: Any) -> Answer:
-        entry = body["type"] == EventType.ZONE_ENTER.value
+        retracts = data.get("retracts")
+        entry = EventType.ZONE_ENTER.value == body["type"] or data.get("retracted_type") == EventType.ZONE_EXIT.value
         trackable = str(self._hub.assets.id_of(body["subject"]))
         stored = self._hub.fences.stored(data["zone"])
         own = {"provider_id": body["subject"], "probability": data["probability"], "sequence": body["sequence"]}
+        own |= {"retracts": str(uuid.UUID(retracts))} if retracts else {}
         return without_nulls(
             {
                 "id": str(uuid.UUID(body["id"])),
@@ -115,9 +120,10 @@ class CollisionFeed(EventFeed):
         return without_nulls(
             {
                 "id": str(uuid.UUID(body["id"])),
-                "collision_type": "collision_start",
+                "collision_type": "collision_end" if data.get("retracts") else "collision_start",
                 "start_time": iso_ms(data["since_ns"]),
                 "collision_time": iso_ms(data["t_ns"]),
+                "end_time": iso_ms(data["t_ns"]) if data.get("retracts") else None,
                 "collisions": [{"id": str(self._hub.assets.id_of(tag)), "object_type": "trackable"} for tag in tags],
                 "center_distance": data["distance_m"],
             }

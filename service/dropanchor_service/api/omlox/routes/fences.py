@@ -10,15 +10,7 @@ from dropanchor_service.api.http.errors import Kind
 from dropanchor_service.api.omlox.geojson import fence_feature, location_feature, motion_feature
 from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.hub_of_request import SiteHub
-from dropanchor_service.api.omlox.models import (
-    Feature,
-    FeatureCollection,
-    Fence,
-    Location,
-    LocationProvider,
-    Trackable,
-    TrackableMotion,
-)
+from dropanchor_service.api.omlox.models import Feature, FeatureCollection, Location, TrackableMotion
 from dropanchor_service.api.omlox.parameters import (
     LENIENT,
     ChangeQuery,
@@ -35,6 +27,7 @@ from dropanchor_service.api.omlox.parameters import (
 )
 from dropanchor_service.api.omlox.projection import projection_of
 from dropanchor_service.api.routes.parameters import json_response
+from dropanchor_service.store.omlox_models import Fence, LocationProvider, Trackable
 from dropanchor_service.store.tags import Tag
 
 _UNKNOWN = Kind.UNKNOWN_FENCE

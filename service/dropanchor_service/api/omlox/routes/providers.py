@@ -10,14 +10,7 @@ from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.omlox.geojson import location_feature
 from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.hub_of_request import SiteHub
-from dropanchor_service.api.omlox.models import (
-    Feature,
-    FeatureCollection,
-    Fence,
-    Location,
-    LocationProvider,
-    Trackable,
-)
+from dropanchor_service.api.omlox.models import Feature, FeatureCollection, Location
 from dropanchor_service.api.omlox.own_properties import without_own
 from dropanchor_service.api.omlox.parameters import (
     LENIENT,
@@ -34,6 +27,7 @@ from dropanchor_service.api.omlox.routes.fences import fences_around
 from dropanchor_service.api.omlox.trackable_changes import forget, name_tag, save
 from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import json_response, saving
+from dropanchor_service.store.omlox_models import Fence, LocationProvider, Trackable
 from dropanchor_service.store.tags import Tag
 
 _UNKNOWN = Kind.UNKNOWN_TAG

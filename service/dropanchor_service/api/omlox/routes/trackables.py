@@ -10,15 +10,7 @@ from dropanchor_service.api.omlox.assets import Asset
 from dropanchor_service.api.omlox.geojson import location_feature, motion_feature
 from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.hub_of_request import SiteHub
-from dropanchor_service.api.omlox.models import (
-    Feature,
-    FeatureCollection,
-    Fence,
-    Location,
-    LocationProvider,
-    Trackable,
-    TrackableMotion,
-)
+from dropanchor_service.api.omlox.models import Feature, FeatureCollection, Location, TrackableMotion
 from dropanchor_service.api.omlox.parameters import (
     LENIENT,
     ChangeQuery,
@@ -34,6 +26,7 @@ from dropanchor_service.api.omlox.places import best_of
 from dropanchor_service.api.omlox.routes.fences import fences_around
 from dropanchor_service.api.omlox.trackable_changes import add, change, remove
 from dropanchor_service.api.routes.parameters import json_response
+from dropanchor_service.store.omlox_models import Fence, LocationProvider, Trackable
 
 _UNKNOWN = Kind.UNKNOWN_TRACKABLE
 _PLACED = (Kind.NOT_GEOREFERENCED,)

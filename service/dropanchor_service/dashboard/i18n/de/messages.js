@@ -1,6 +1,7 @@
 /** All messages in German. */
 
 import alerts from "./alerts.js";
+import find from "./find.js";
 import plans from "./plans.js";
 import keys from "./keys.js";
 import notify from "./notify.js";
@@ -13,4 +14,4 @@ import refusals from "./refusals.js";
 import service from "./service.js";
 import share from "./share.js";
 
-export default { ...alerts, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...refusals, ...share };
+export default { ...alerts, ...find, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...refusals, ...share };

@@ -8,7 +8,7 @@ export default {
   "phone.broken": "Keine Verbindung",
   "phone.refused": "Abgewiesen",
   "phone.title": "Dieses Telefon zum Tag machen",
-  "phone.how": "Scannen Sie den Code, den {0} ausgibt, oder tippen Sie ab, was dort steht. Die Seite behält beides, bis Sie diesen Browser-Tab schließen.",
+  "phone.how": "Öffnen Sie den Link, den ein Administrator auf der Seite anlegt (Anzeige, Schlüssel), scannen Sie den Code, den {0} ausgibt, oder tippen Sie ab, was dort steht. Die Seite behält beides, bis Sie diesen Browser-Tab schließen.",
   "phone.no_key": "Ein Dienst ohne Schlüssel braucht keinen.",
   "phone.use": "Dieses Tag verwenden",
   "phone.this_tag": "Dieses Tag",

@@ -49,6 +49,8 @@ export default {
   "anchors.deleted": "Anker {id} gelöscht.",
   "anchors.delete_question": "Anker {id} löschen? Seine Distanzen werden nicht mehr verwendet.",
   "outcome.undo": "Rückgängig",
+  "outcome.redo": "Wiederholen",
+  "outcome.needs_admin": "Um das rückgängig zu machen, braucht man den Schlüssel eines Administrators.",
   "outcome.undone": "Rückgängig gemacht: {what}",
   "outcome.not_undone": "Nicht rückgängig gemacht, weil es inzwischen jemand geändert hat: {what}",
   "outcome.conflict": "Jemand anders hat das inzwischen geändert. Nicht ausgeführt: {what}",

@@ -8,7 +8,7 @@ export default {
   "phone.broken": "No connection",
   "phone.refused": "Refused",
   "phone.title": "Make this phone a tag",
-  "phone.how": "Scan the code that {0} prints, or type what it says. The page keeps both until you close this browser tab.",
+  "phone.how": "Open the link that an administrator makes on the page (Display, Keys), scan the code that {0} prints, or type what it says. The page keeps both until you close this browser tab.",
   "phone.no_key": "A service without keys needs none.",
   "phone.use": "Use this tag",
   "phone.this_tag": "This tag",

@@ -49,6 +49,8 @@ export default {
   "anchors.deleted": "Anchor {id} deleted.",
   "anchors.delete_question": "Delete anchor {id}? Its ranges are no longer used.",
   "outcome.undo": "Undo",
+  "outcome.redo": "Redo",
+  "outcome.needs_admin": "Undoing this needs the key of an administrator.",
   "outcome.undone": "Undone: {what}",
   "outcome.not_undone": "Not undone, because somebody changed it since: {what}",
   "outcome.conflict": "Somebody else changed this meanwhile. Not done: {what}",

@@ -1,209 +1,26 @@
-"""A tag that a person carries: hypotheses about how it is held, and what its steps tell.
+"""A tag that a person carries: how its state wanders.
 
 The course is yaw + mount + slip, where the mounting angle may be anything and slip is the sway of the hand. The speed
-is a random walk that steps measure, with a scale e^k of their own, and the direction of the steps measures mount + slip
-with an offset b of the device's swing:
-
-    step speed = v e^k,    gait angle = mount + slip + b
-
-Accelerations are not used, so k and b stand in the state where the accelerometer's biases are otherwise.
+is a random walk that steps measure (`measurement/steps.py`). Accelerations are not used, so the scale and the offset of
+the steps stand in the state where the accelerometer's biases are otherwise.
 """
 
 import math
 from typing import Final
 
-from dropanchor_service.estimation.fleet.angles import TWO_PI, wrap
-from dropanchor_service.estimation.fleet.belief.heading_reference import is_of_another_axis, restart_reference
 from dropanchor_service.estimation.fleet.belief.layout import (
-    ACC_BIAS,
     GAIT_OFFSET,
-    GYRO_BIAS,
-    LEFT_BIAS,
-    MAX_HYPOTHESES,
     MOUNT,
-    PHI,
-    RANGE_BIAS,
     SLIP,
     STEP_SCALE,
-    YAW,
     Floats,
-    Hypotheses,
-    Hypothesis,
-    N,
-    R,
     Row,
-    Scratch,
     V,
 )
-from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis
-from dropanchor_service.estimation.fleet.belief.update import gaussian, project, update_component, update_pda
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.node import MEASURED_HEADING, Node
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-USUAL_SPEED: Final = 1.2  # m/s, of a walk
-LEAST_SCALE_SPEED: Final = 0.1  # m/s
-FLIPPED, ANYWHERE = 0.05, 0.05  # shares of gait angles that point backwards, or anywhere
-BRANCH_DEPTH: Final = 4.0  # log weight below the best at which a hypothesis gets no child
-ANY_DIRECTION_VAR: Final = math.pi**2  # rad^2, so wide that one direction is hardly likelier than another
 RING_MOUNT_STD: Final = 1.2  # rad, of the mounting angle of somebody's device, as one Gaussian
-MOUNT_KNOWN: Final = 0.3  # rad, of a mounting angle that the operator knows
-
-
-@njit(nogil=True)
-def note_origin(row: Row, var: float) -> None:
-    """Note where the tag is before its first steps. var: m^2."""
-    row.walk.x, row.walk.y, row.walk.var = row.publication.x, row.publication.y, var
-
-
-@njit(nogil=True)
-def follow_motion(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> int:
-    """Make the hypotheses those of what moves the tag now. Return their count."""
-    if row.walk.carried == node.carried:
-        if node.carried == 0 and (node.walked == 0.0 or row.walk.var == 0.0):
-            P = work[best_of(work, count)].cov
-            note_origin(row, P[R, R] + work[best_of(work, count)].mean[R] ** 2 * P[PHI, PHI])
-        return count
-    if node.carried == 1 and _is_too_fast(work[best_of(work, count)], t):
-        node.carried = 0
-        return count
-    row.walk.carried = node.carried
-    if node.carried == 0:
-        _set_down(work, count, row, t)
-        return count
-    if node.heading_kind == MEASURED_HEADING:
-        restart_reference(work[best_of(work, count)], row, node.heading - node.dyaw, node.heading_var)
-    return _pick_up(work, count, row, node, t)
-
-
-@njit(nogil=True)
-def start_carried(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> int:
-    """Make the first hypotheses those of a carried tag. Return their count."""
-    row.walk.carried = 1
-    if row.start.known == 1 and row.start.after_gap == 0:
-        s, P = work[0].mean, work[0].cov
-        row.walk.x, row.walk.y = s[R] * math.cos(s[PHI]), s[R] * math.sin(s[PHI])
-        row.walk.var = P[R, R] + s[R] ** 2 * P[PHI, PHI]
-        return _pick_up(work, count, row, node, t)
-    for h in range(count):
-        _become_carried(work[h], row, node, t)
-        widen_common_mount(work[h].cov, row)
-    return count
-
-
-@njit(nogil=True)
-def was_walked_off(row: Row, node: Node) -> bool:
-    """Return whether a person carries a tag whose place was not known when the steps began.
-
-    Its hypotheses are those of a vehicle that the steps accelerated, and no others are left.
-    """
-    return bool(node.carried == 1 and row.walk.carried == 0 and row.publication.resolved == 0)
-
-
-@njit(nogil=True)
-def _is_too_fast(one: Hypothesis, t: Tuning) -> bool:
-    """Return whether nobody walks as fast: what looks like steps are bumps."""
-    return bool(one.mean[V] - 3.0 * math.sqrt(one.cov[V, V]) > t.walk_speed_max)
-
-
-@njit(nogil=True)
-def _clear(P: Floats, i: int, variance: float) -> None:
-    for j in range(N):
-        P[i, j] = P[j, i] = 0.0
-    P[i, i] = variance
-
-
-@njit(nogil=True)
-def _become_carried(one: Hypothesis, row: Row, node: Node, t: Tuning) -> None:
-    """Replace what a vehicle's hypothesis says of speed, slip and accelerometer."""
-    s, P = one.mean, one.cov
-    one.reverse = one.aligned = 0
-    for i in (V, SLIP, GAIT_OFFSET, STEP_SCALE, GYRO_BIAS):
-        s[i] = 0.0
-    _clear(P, V, t.walk_speed_std**2)
-    _clear(P, SLIP, t.sway_std**2)
-    _clear(P, GAIT_OFFSET, ANY_DIRECTION_VAR if is_of_another_axis(row, node) else t.gait_offset_std**2)
-    _clear(P, STEP_SCALE, t.step_scale_std**2)
-    _clear(P, GYRO_BIAS, t.walk_gyro_bias_std**2)  # a rest in the hand, or shaking, may have taught a wrong one
-    s[V] = USUAL_SPEED if node.walked > 0.0 else 0.0
-
-
-@njit(nogil=True)
-def widen_common_mount(P: Floats, row: Row) -> None:
-    """Widen the mounting angle to that of anybody's device, and with it the bearing of a ring.
-
-    In a frame of the tag's own the course is given, so the yaw takes the error instead of the bearing.
-    """
-    more = RING_MOUNT_STD**2 - row.settings.mount_angle_std**2
-    if row.settings.mount_angle_std < MOUNT_KNOWN:
-        return
-    other, sign = (PHI, 1.0) if row.heading.in_site_frame == 1 else (YAW, -1.0)
-    P[MOUNT, MOUNT] += more
-    P[other, other] += more
-    P[other, MOUNT] += sign * more
-    P[MOUNT, other] = P[other, MOUNT]
-
-
-@njit(nogil=True)
-def _pick_up(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> int:
-    """Put one hypothesis per way to hold the device where the steps since the walk began lead. Return their count."""
-    copy_hypothesis(work, best_of(work, count), 0)
-    one = work[0]
-    one.log_weight = 0.0
-    _become_carried(one, row, node, t)
-    _see_again(one, row)
-    known = row.settings.mount_angle_std < MOUNT_KNOWN
-    cells = 1 if known else t.grips
-    cell = TWO_PI / t.grips
-    if not known:
-        _clear(one.cov, MOUNT, (cell / 2.0) ** 2)
-    for h in range(cells - 1, -1, -1):
-        copy_hypothesis(work, 0, h)
-        one = work[h]
-        if not known:
-            angle = wrap(cell * h)
-            one.mean[MOUNT] = angle
-            density = t.front_share * gaussian(angle, t.front_std**2) + (1.0 - t.front_share) / TWO_PI
-            one.log_weight = math.log(density)
-        _walk_from_origin(one, row, node, t)
-    return cells
-
-
-@njit(nogil=True)
-def _see_again(one: Hypothesis, row: Row) -> None:
-    """Take back what the steps since were explained with: a line of sight that is lost, and a track that is wrong."""
-    if one.nlos == 1:
-        one.nlos = 0
-        one.mean[RANGE_BIAS] = one.los_bias
-        _clear(one.cov, RANGE_BIAS, one.los_bias_var)
-    nlos = row.nlos
-    nlos.high_run = nlos.low_run = nlos.widened = 0
-    nlos.misfit = nlos.misfit_s = 0.0
-
-
-@njit(nogil=True)
-def _walk_from_origin(one: Hypothesis, row: Row, node: Node, t: Tuning) -> None:
-    """Move the hypothesis from where the tag stood last by the steps since, along its course."""
-    s, P, walk = one.mean, one.cov, row.walk
-    course = s[YAW] + node.dyaw + s[MOUNT] + s[SLIP]  # the node is predicted later
-    x, y = walk.x + node.walked * math.cos(course), walk.y + node.walked * math.sin(course)
-    variance = walk.var + t.walk_start_var + (t.walk_start_share * node.walked) ** 2
-    s[R], s[PHI] = max(math.hypot(x, y), 0.1), math.atan2(y, x)
-    _clear(P, R, variance)
-    _clear(P, PHI, variance / s[R] ** 2)
-
-
-@njit(nogil=True)
-def _set_down(work: Hypotheses, count: int, row: Row, t: Tuning) -> None:
-    """Make all hypotheses those of a vehicle whose mounting angle is not known."""
-    for h in range(count):
-        s, P = work[h].mean, work[h].cov
-        s[ACC_BIAS] = s[LEFT_BIAS] = s[SLIP] = 0.0
-        _clear(P, ACC_BIAS, t.acc_bias_std**2)
-        _clear(P, LEFT_BIAS, t.left_bias_std**2)
-        _clear(P, SLIP, row.settings.slip_std**2)
-        P[MOUNT, MOUNT] += row.settings.mount_angle_std**2
-        P[V, V] += t.walk_speed_std**2
 
 
 @njit(nogil=True)
@@ -215,81 +32,4 @@ def fill_carried_noise(decay: Floats, growth: Floats, dt: float, row: Row, t: Tu
     std = row.settings.slip_std if row.settings.slip_given == 1 else t.sway_std
     growth[SLIP] = std**2 * (1.0 - decay[SLIP] ** 2)
     decay[GAIT_OFFSET] = decay[STEP_SCALE] = 1.0
-    growth[GAIT_OFFSET], growth[STEP_SCALE] = t.q_gait_offset * dt, t.q_step_scale * dt
-
-
-@njit(nogil=True)
-def update_with_steps(work: Hypotheses, count: int, node: Node, t: Tuning, scratch: Scratch) -> int:
-    """Update every hypothesis with the node's steps, and let a device turn without its carrier. Return the count."""
-    for h in range(count):
-        if node.step_speed > 0.0:
-            update_step_speed(work[h], scratch, node.step_speed, t)
-        if node.gait_coherence > 0.0:
-            work[h].log_weight += update_gait_angle(work[h], scratch, node.gait_angle, t)
-        if node.stands == 1:
-            update_component(work[h].mean, work[h].cov, scratch.PH, V, 0.0, t.stand_std**2)
-    return _branch_on_turn(work, count, node.turned, t) if node.turned != 0.0 else count
-
-
-@njit(nogil=True)
-def predict_step_speed(s: Floats, H: Floats) -> float:
-    """Return v e^k, m/s, and fill H with its derivative."""
-    scale = math.exp(s[STEP_SCALE])
-    H[:] = 0.0
-    H[V] = scale
-    H[STEP_SCALE] = scale * max(s[V], LEAST_SCALE_SPEED)
-    return float(s[V] * scale)
-
-
-@njit(nogil=True)
-def step_speed_variance(z: float, t: Tuning) -> float:
-    """Return the variance, (m/s)^2, of a speed that steps give."""
-    return float(max(t.step_speed_share * z, t.step_speed_std) ** 2)
-
-
-@njit(nogil=True)
-def widen_at_change(P: Floats, t: Tuning) -> None:
-    """Widen a covariance by what is not known when a vehicle becomes a carried tag, or the other way round."""
-    P[V, V] += t.walk_speed_std**2
-    P[MOUNT, MOUNT] += RING_MOUNT_STD**2
-    P[ACC_BIAS, ACC_BIAS] += t.gait_offset_std**2
-    P[LEFT_BIAS, LEFT_BIAS] += t.step_scale_std**2
-
-
-@njit(nogil=True)
-def update_step_speed(one: Hypothesis, scratch: Scratch, z: float, t: Tuning) -> None:
-    """Update with the speed of the steps, m/s: z = v e^k."""
-    e = z - predict_step_speed(one.mean, scratch.H)
-    S = project(one.cov, scratch.H, scratch.PH) + step_speed_variance(z, t)
-    update_pda(one.mean, one.cov, scratch.PH, S, e, 1.0)
-
-
-@njit(nogil=True)
-def update_gait_angle(one: Hypothesis, scratch: Scratch, z: float, t: Tuning) -> float:
-    """Update with the direction of the steps, rad: z = mount + slip + b. Return the log likelihood."""
-    s, H = one.mean, scratch.H
-    e = wrap(z - s[MOUNT] - s[SLIP] - s[GAIT_OFFSET])
-    H[:] = 0.0
-    H[MOUNT] = H[SLIP] = H[GAIT_OFFSET] = 1.0
-    S = project(one.cov, H, scratch.PH) + t.gait_angle_std**2
-    inside = (1.0 - FLIPPED - ANYWHERE) * gaussian(e, S)
-    outside = FLIPPED * gaussian(wrap(e + math.pi), S) + ANYWHERE / TWO_PI
-    update_pda(s, one.cov, scratch.PH, S, e, inside / (inside + outside))
-    return math.log(inside + outside)
-
-
-@njit(nogil=True)
-def _branch_on_turn(work: Hypotheses, count: int, turned: float, t: Tuning) -> int:
-    """Give each likely hypothesis a child in which the device turned, and not the walker. Return the count."""
-    floor = work[best_of(work, count)].log_weight - BRANCH_DEPTH
-    for h in range(count):
-        if work[h].log_weight > floor and count < MAX_HYPOTHESES:
-            copy_hypothesis(work, h, count)
-            child = work[count]
-            child.mean[MOUNT] = wrap(child.mean[MOUNT] - turned)
-            child.log_weight += t.device_turn_log_prior
-            child.cov[R, R] += t.device_turn_var
-            child.cov[PHI, PHI] += t.device_turn_var / max(child.mean[R], 1.0) ** 2
-            child.cov[MOUNT, MOUNT] += (t.device_turn_share * turned) ** 2
-            count += 1
-    return count
+    growth[GAIT_OFFSET], growth[STEP_SCALE] = 0.0, t.q_step_scale * dt

@@ -9,6 +9,9 @@ import math
 from typing import Final
 
 from dropanchor_service.estimation.fleet.angles import wrap
+from dropanchor_service.estimation.fleet.belief.births.forgetting import GAP, PLACE, forget
+from dropanchor_service.estimation.fleet.belief.births.numbers import AFTER_GAP
+from dropanchor_service.estimation.fleet.belief.births.switches import is_on
 from dropanchor_service.estimation.fleet.belief.layout import (
     PHI,
     STUCK_SLOTS,
@@ -22,11 +25,13 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     V,
 )
 from dropanchor_service.estimation.fleet.belief.mixture import best_of
+from dropanchor_service.estimation.fleet.belief.publish import IMU_LOST_AFTER
 from dropanchor_service.estimation.fleet.belief.start import is_in_site_frame, start_distance
 from dropanchor_service.estimation.fleet.belief.states import DEGRADED, IMU_MISSING, INITIALISING, LOST
 from dropanchor_service.estimation.fleet.belief.summary import course_of
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import MOVING, RANGE, Node
+from dropanchor_service.estimation.fleet.tuning import Tuning
 
 MAX_GAP_WITH_REFERENCE: Final = 1.0  # s that a track survives where a reference gives the heading afterwards
 MAX_GAP: Final = 0.5  # s, where none does
@@ -35,7 +40,6 @@ RESUME_ANYWHERE_AFTER: Final = 2.0  # the same, of a row that may be anywhere
 MAX_FRAGMENTS: Final = 2  # stretches of samples between gaps, after which a row waits for its own turn to start
 RESTART_SPREAD: Final = 10.0  # s over which such rows start again: all at once would cost a fleet many times as much
 GOLDEN_RATIO: Final = 0.6180339887498949  # its multiples spread neighbouring row numbers evenly
-LOST_AFTER_GAP: Final = 10.0  # s
 SPEED_CHANGE: Final = 1.0  # m/s, sd of the speed beyond the last one
 MAX_BEARING_ERROR: Final = 1.0  # rad: a tag that may be further from where it was may be anywhere
 STUCK_COUNT: Final = 3  # equal ranges after the first, of a tag that moves
@@ -145,16 +149,16 @@ def publish_suspended(row: Row, node: Node, anchors: Anchors, belief: Belief) ->
     belief.cov[2, 2] = math.pi**2 / 3.0
     belief.p_mode, belief.sigma_pos, belief.sigma_obs = 1.0, math.sqrt(2.0 * variance), math.inf
     belief.hypotheses, belief.relative = 1, gap.relative
-    publication.state = LOST if gap.unobserved_s > LOST_AFTER_GAP else DEGRADED
+    publication.state = LOST if gap.unobserved_s > IMU_LOST_AFTER else DEGRADED
     publication.reason = IMU_MISSING
 
 
 @njit(nogil=True)
-def restart_from_gap(row: Row, anchor: Anchor) -> None:
+def restart_from_gap(row: Row, anchor: Anchor, t: Tuning) -> None:
     """Set the row's start to where the tag was, as wide as the gap makes it, or to unknown if that is anywhere."""
     gap, start = row.gap, row.start
-    known, std = _is_position_known(row), math.sqrt(_position_variance(row))
-    gap.unobserved_s = 0.0
+    known, std = is_on(AFTER_GAP, t) and _is_position_known(row), math.sqrt(_position_variance(row))
+    forget(row, GAP)
     start.heading = math.nan
     start.coarse, row.publication.state = 1, INITIALISING
     if known:
@@ -163,8 +167,7 @@ def restart_from_gap(row: Row, anchor: Anchor) -> None:
         start.std = std
         start.speed_std = gap.speed + SPEED_CHANGE
     else:
-        start.after_gap = 0
-        start.known = 0
+        forget(row, PLACE)
 
 
 @njit(nogil=True)

@@ -9,6 +9,7 @@ out; an error that wanders for seconds does not.
 
 import math
 
+from dropanchor_service.estimation.columns import HeadingSource
 from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.belief.layout import (
     BANK,
@@ -28,7 +29,8 @@ SOFT_IRON_FACTOR = 3.0  # times the claimed error of a magnetometer
 SWITCH_LOG_RATIO = 3.0  # log likelihood by which another model must win
 LATER_LOG_PRIOR = -2.0  # of all models but the first
 MAX_SQUARED_ERROR = 25.0  # in variances: one reading must not decide between models
-GIVEN_TAU = 60.0  # s, of an error that the operator gave
+SLOW_TAU = 60.0  # s, of an error of the reference that is given, of a platform's, or of a class of its own
+FROM_IMU = int(HeadingSource.IMU)
 
 
 @njit(nogil=True)
@@ -40,7 +42,7 @@ def model_parameters(m: int, variance: float) -> tuple[float, float, float]:
     if m == MAGNETOMETER_MODEL:
         return 0.01 * variance + 1e-5, math.sqrt(variance), 30.0
     if m == PLATFORM_MODEL:
-        return 4e-4, 0.03, 60.0
+        return 4e-4, 0.03, SLOW_TAU
     if m == 1:
         return 0.01 * variance, 0.1, 3.0
     if m == DRIFT_MODEL:
@@ -52,18 +54,23 @@ def model_parameters(m: int, variance: float) -> tuple[float, float, float]:
 
 @njit(nogil=True)
 def reference_error(row: Row, variance: float) -> tuple[float, float, float]:
-    """Return `model_parameters` of the row's model, or what the operator gave for a platform's heading.
+    """Return `model_parameters` of the row's model, or what the operator gave for the heading.
 
-    With a given start heading a magnetometer gets three times the error it claims. Soft iron and the place disturb it
-    in the same way on every lap, so that does not average out; gyroscope and ranges know the yaw better for minutes.
+    For a magnetometer that is beside what its filter claims. Without it, and with a given start heading, a magnetometer
+    gets three times the error it claims. Soft iron and the place disturb it in the same way on every lap, so that does
+    not average out; gyroscope and ranges know the yaw better for minutes.
     """
-    if not is_heading_std_given(row):
-        white, slow, tau = model_parameters(row.heading.model, variance)
-        if row.heading.model == MAGNETOMETER_MODEL and row.start.known == 1 and math.isfinite(row.start.heading):
+    if row.heading.model == MAGNETOMETER_MODEL:
+        white, slow, tau = model_parameters(MAGNETOMETER_MODEL, variance)
+        if is_north_given(row):
+            slow = math.hypot(slow, row.settings.heading_std)
+        elif row.start.known == 1 and math.isfinite(row.start.heading):
             slow *= SOFT_IRON_FACTOR
         return white, slow, tau
+    if not is_heading_std_given(row):
+        return model_parameters(row.heading.model, variance)
     white, _, _ = model_parameters(PLATFORM_MODEL if row.heading.model == PLATFORM_MODEL else 0, variance)
-    return white, row.settings.heading_std, GIVEN_TAU
+    return white, row.settings.heading_std, SLOW_TAU
 
 
 @njit(nogil=True)
@@ -73,14 +80,22 @@ def class_reference_error(row: Row, heading_class: int, variance: float, t: Tuni
         return model_parameters(0, variance)
     white, slow, tau = reference_error(row, variance)
     if heading_class == OWN_ERROR and row.heading.model != PLATFORM_MODEL:
-        return white, math.sqrt(slow * slow + t.own_error_std**2), max(t.own_error_tau, tau)
+        return white, math.sqrt(slow * slow + t.own_error_std**2), SLOW_TAU
     return white, slow, tau
 
 
 @njit(nogil=True)
 def is_heading_std_given(row: Row) -> bool:
     """Return whether the operator gave the error of the heading in use."""
-    return row.heading.model != MAGNETOMETER_MODEL and math.isfinite(row.settings.heading_std)
+    if row.heading.model == MAGNETOMETER_MODEL:
+        return is_north_given(row)
+    return math.isfinite(row.settings.heading_std)
+
+
+@njit(nogil=True)
+def is_north_given(row: Row) -> bool:
+    """Return whether the operator gave the error of north. With the IMU as the source it is that of no platform."""
+    return bool(row.settings.heading_source == FROM_IMU and math.isfinite(row.settings.heading_std))
 
 
 @njit(nogil=True)

@@ -3,6 +3,7 @@
 import math
 
 from dropanchor_service.estimation.fleet.angles import wrap
+from dropanchor_service.estimation.fleet.belief.births.forgetting import REFERENCE_ERROR, forget
 from dropanchor_service.estimation.fleet.belief.layout import (
     EXACT,
     MOUNT,
@@ -109,4 +110,4 @@ def restart_reference(one: Hypothesis, row: Row, yaw: float, variance: float) ->
     for i in range(N):
         P[YAW, i] = P[i, YAW] = P[REFERENCE, i] = P[i, REFERENCE] = 0.0
     P[YAW, YAW] = variance
-    row.heading.bank_started = row.heading.model = 0
+    forget(row, REFERENCE_ERROR)

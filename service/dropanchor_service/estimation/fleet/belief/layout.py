@@ -21,9 +21,7 @@ ACC_BIAS: Final = 7  # m/s^2, bias of the forward acceleration
 REFERENCE: Final = 8  # rad, error of the heading reference
 RANGE_BIAS: Final = 9  # m, bias of ranges to the primary anchor, as measured
 LEFT_BIAS: Final = 10  # m/s^2, bias of the leftward acceleration
-GAIT_OFFSET: Final = (
-    ACC_BIAS  # rad, of a carried tag, whose accelerations are not used: direction of its steps - course
-)
+GAIT_OFFSET: Final = ACC_BIAS  # rad, of a carried tag, instead of accelerations: direction of its steps - course
 STEP_SCALE: Final = LEFT_BIAS  # of a carried tag: log of the speed that its steps give over its speed
 N: Final = 11
 PACKED: Final = N * (N + 1) // 2  # entries of the upper triangle of a covariance
@@ -31,6 +29,7 @@ PACKED: Final = N * (N + 1) // 2  # entries of the upper triangle of a covarianc
 WORKING_HYPOTHESES: Final = 320  # at most, of one row while it is being worked on
 MAX_HYPOTHESES: Final = 192  # at most, of one row between batches
 START_RANGES: Final = 15  # of which the median gives the distance of an unknown start
+NOISE_LEVELS: Final = 6  # of errors of ranges that last
 STUCK_SLOTS: Final = 4  # anchors of a row whose last ranges are kept; those of equal remainder share a slot
 
 # Models of the error of the heading reference (`heading_models`). The first BANK are judged by their predictions.
@@ -55,9 +54,11 @@ SETTINGS: Final = np.dtype(
         ("slip_std", np.float64),  # rad
         ("slip_tau", np.float64),  # s
         ("slip_given", np.uint8),  # 1: the operator gave slip_std
-        ("height", np.float64),  # m, tag antenna above the site's zero
+        ("height", np.float64),  # m, tag antenna above the site's zero: as told, or of the last node
         ("height_std", np.float64),
+        ("height_source", np.uint8),  # TOLD, BY_PRESSURE or UNKNOWN
         ("range_std", np.float64),  # m, of a measured range
+        ("range_std_given", np.uint8),  # 1: the operator gave it
         ("range_scale", np.float64),  # measured = scale * distance + bias
         ("range_bias", np.float64),  # m
         ("range_bias_std", np.float64),
@@ -66,7 +67,7 @@ SETTINGS: Final = np.dtype(
         ("speed_max", np.float64),  # m/s
         ("reverse_allowed", np.uint8),
         ("heading_source", np.uint8),
-        ("heading_std", np.float64),  # rad, of a platform's heading that does not drift; NaN: not known
+        ("heading_std", np.float64),  # rad, of a platform's heading that does not drift, or of north; NaN: not known
     ]
 )
 
@@ -108,6 +109,25 @@ NLOS: Final = np.dtype(
         ("misfit_s", np.float64),  # s for which most ranges have been outliers
         ("widened", np.int32),  # how often the track was widened since the ranges last agreed with it
         ("since_los_offer_s", np.float64),  # s since NLOS hypotheses were last offered a clear line of sight
+    ]
+)
+
+NOISE: Final = np.dtype(
+    [
+        ("white_var", np.float64),  # m^2, of what is new in every range; 0: not started
+        ("told", np.uint8),  # 1: the operator or the first range said how much ranges scatter
+        ("count", np.float64),  # ranges that white_var was learned from
+        ("z", np.float64, (2,)),  # m, the last two ranges to the primary anchor, and when they came
+        ("t_ns", np.int64, (2,)),
+        ("log_p", np.float64, (NOISE_LEVELS,)),  # of the levels of errors that last
+        ("factor", np.float64),  # by which the variance of a range is larger than white_var
+        ("peak", np.float64),  # largest factor lately
+        ("lasting_var", np.float64),  # m^2, of the errors that last
+        ("block_s", np.float64),  # s of the block of ranges that is being added up
+        ("block_ranges", np.int32),  # how many they are
+        ("error", np.float64),  # m, sum of its innovations
+        ("spread", np.float64),  # m^2, sum of their variances without that of the ranges
+        ("white", np.float64),  # m^2, sum of white_var
     ]
 )
 
@@ -175,6 +195,7 @@ ROW: Final = np.dtype(
         ("start", START),
         ("heading", HEADING),
         ("nlos", NLOS),
+        ("noise", NOISE),
         ("gap", GAP),
         ("publication", PUBLICATION),
         ("stuck", STUCK),
@@ -214,8 +235,7 @@ POOL_SLOT: Final = np.dtype(
 
 BELIEF: Final = np.dtype(
     [
-        ("x", np.float64),
-        ("y", np.float64),
+        *((name, np.float64) for name in ("x", "y", "z", "z_std")),  # m
         ("course", np.float64),
         ("yaw", np.float64),
         ("speed", np.float64),
@@ -227,6 +247,8 @@ BELIEF: Final = np.dtype(
         ("innovation", np.float64),  # of the likeliest hypothesis, in the units of the measurement
         ("innovation_variance", np.float64),  # 0: no measurement met a belief
         ("p_outlier", np.float64),
+        ("white_std", np.float64),  # m, of what is new in every range; 0: the measurement was none
+        ("lasting_std", np.float64),  # m, of the errors of ranges that last
         ("stuck", np.bool_),  # the range is one that a stuck radio repeats
         ("hypotheses", np.int32),
         ("state", np.uint8),
@@ -245,8 +267,6 @@ WORKING_HYPOTHESIS: Final = np.dtype(
         ("los_bias", np.float64),
         ("los_bias_var", np.float64),
         ("mean", np.float64, (N,)),
-        ("cov", np.float64, (N, N)),
-        ("delta", np.float64, (N,)),  # scratch of merging and splitting
         ("weight", np.float64),  # `summary.fill_positions` fills this and what follows
         ("direction", np.float64, (2,)),  # unit vector from the anchor
         ("position", np.float64, (2,)),  # m, from the anchor
@@ -255,6 +275,8 @@ WORKING_HYPOTHESIS: Final = np.dtype(
         ("merged", np.bool_),  # into a heavier one
         ("in_mode", np.bool_),  # a member of the mode under consideration
         ("assigned", np.bool_),  # to a mode considered before
+        ("cov", np.float64, (N, N)),
+        ("delta", np.float64, (N,)),  # scratch of merging and splitting
     ],
     align=True,
 )

@@ -1,4 +1,4 @@
-"""Keep the Gaussian mixture small and consistent: normalise, prune, merge and split."""
+"""Keep the Gaussian mixture small and consistent: normalise, prune and merge."""
 
 import math
 
@@ -7,8 +7,6 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     MAX_HYPOTHESES,
     MOUNT,
     PHI,
-    SLIP,
-    WORKING_HYPOTHESES,
     YAW,
     Floats,
     Hypotheses,
@@ -21,11 +19,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-SPLIT_CENTRE, SPLIT_SIDE = 0.5496, 0.2252  # weights of the three parts
-SPLIT_SHIFT = 1.0576  # standard deviations
-SPLIT_REMOVED = 0.549  # share of the variance
 MERGED_MOUNTS = 0.2  # rad, by which two mounting angles differ at most that are merged
-LEAST_RATE = 0.01  # m/s, error of a range rate below which nothing is split
 ALIKE = 2.0  # ratio of two variances that are alike
 
 
@@ -106,41 +100,9 @@ def angle_variance(P: Floats) -> float:
 
 
 @njit(nogil=True)
-def curvature(one: Hypothesis, variance: float) -> float:
-    """Return how far from linear the range rate v cos a is over the errors of the speed v and the angle a.
-
-    It is their product, |sin a| sd(v) sd(a), over what a linear update takes the error of the rate for. A tag that
-    travels across the line of sight with a slowly learned speed has 0.3 and more. variance: rad^2, of a.
-    """
-    s, P = one.mean, one.cov
-    a = s[YAW] + s[MOUNT] + s[SLIP] - s[PHI]
-    c, turned = math.cos(a), s[V] * math.sin(a)
-    rate = c * c * P[V, V] + turned * turned * variance - 2.0 * c * turned * (P[V, YAW] + P[V, MOUNT] - P[V, PHI])
-    return abs(math.sin(a)) * math.sqrt(max(P[V, V] * variance, 0.0) / (max(rate, 0.0) + LEAST_RATE**2))
-
-
-@njit(nogil=True)
-def are_aligned_alike(work: Hypotheses, count: int) -> bool:
-    """Return whether all hypotheses, or none, take the body axis to point along the course."""
-    aligned = 0
-    for h in range(count):
-        aligned += work[h].aligned
-    return bool(aligned == 0 or aligned == count)
-
-
-@njit(nogil=True)
 def is_mounted_otherwise(a: Hypothesis, b: Hypothesis) -> bool:
     """Return whether two hypotheses take the body to be mounted in two quite different ways."""
     return bool(abs(wrap(a.mean[MOUNT] - b.mean[MOUNT])) > 2.0 * MERGED_MOUNTS)
-
-
-@njit(nogil=True)
-def are_mounted_alike(work: Hypotheses, count: int) -> bool:
-    """Return whether no hypothesis takes the body to be mounted quite differently from the best one."""
-    best, others = work[best_of(work, count)], 0
-    for h in range(count):
-        others += is_mounted_otherwise(work[h], best)
-    return bool(others == 0)
 
 
 @njit(nogil=True)
@@ -162,24 +124,26 @@ def _know_mount_alike(a: Hypothesis, b: Hypothesis) -> bool:
 
 
 @njit(nogil=True)
-def _are_close(work: Hypotheses, a: int, b: int, distance: float) -> bool:
-    """Return whether r, v, phi and that angle are each within `distance` standard deviations of the heavier one, a."""
-    if (
-        work[a].heading_class != work[b].heading_class
-        or work[a].nlos != work[b].nlos
-        or work[a].reverse != work[b].reverse
-        or not _know_mount_alike(work[a], work[b])
-        or abs(wrap(work[a].mean[MOUNT] - work[b].mean[MOUNT])) > MERGED_MOUNTS
-    ):
+def _are_alike(a: Hypothesis, b: Hypothesis) -> bool:
+    """Return whether two hypotheses say the same of heading, line of sight, direction and mounting angle."""
+    if a.heading_class != b.heading_class or a.nlos != b.nlos or a.reverse != b.reverse:
         return False
-    P = work[a].cov
+    if abs(wrap(b.mean[MOUNT] - a.mean[MOUNT])) > MERGED_MOUNTS:
+        return False
+    return _know_mount_alike(a, b)
+
+
+@njit(nogil=True)
+def _are_close(a: Hypothesis, b: Hypothesis, distance: float) -> bool:
+    """Return whether r, v, phi and that angle are each within `distance` standard deviations of the heavier one, a."""
+    P = a.cov
     d2 = distance * distance
-    dr = work[b].mean[R] - work[a].mean[R]
-    dv = work[b].mean[V] - work[a].mean[V]
-    dphi = wrap(work[b].mean[PHI] - work[a].mean[PHI])
+    dr = b.mean[R] - a.mean[R]
+    dv = b.mean[V] - a.mean[V]
+    dphi = wrap(b.mean[PHI] - a.mean[PHI])
     if dr * dr > d2 * P[R, R] + 1e-4 or dv * dv > d2 * P[V, V] + 1e-4 or dphi * dphi > d2 * P[PHI, PHI] + 1e-6:
         return False
-    angle = wrap(wrap(work[b].mean[YAW] - work[a].mean[YAW]) + work[b].mean[MOUNT] - work[a].mean[MOUNT] - dphi)
+    angle = wrap(wrap(b.mean[YAW] - a.mean[YAW]) + b.mean[MOUNT] - a.mean[MOUNT] - dphi)
     return bool(angle * angle <= d2 * angle_variance(P) + 1e-6)
 
 
@@ -223,62 +187,19 @@ def merge(work: Hypotheses, count: int, distance: float, light: float) -> int:
     return kept
 
 
-@njit(nogil=True)
+@njit(nogil=True, borrows=True)
 def _merge_close(work: Hypotheses, count: int, ia: int, distance: float, light: float) -> None:
-    """Merge hypotheses close to the ia-th heaviest into it."""
-    a = work[ia].by_weight
+    """Merge hypotheses close to the ia-th heaviest into it. What is cheap to compare is compared first."""
+    heavier = work[ia].by_weight
+    a = work[heavier]
     for ib in range(ia + 1, count):
-        b = work[ib].by_weight
-        if not work[b].merged:
-            lacks = max(work[a].log_weight - work[b].log_weight, 0.0)
-            if _are_close(work, a, b, distance * math.sqrt(1.0 + light * lacks)):
-                _merge_into(work, a, b)
-                work[b].merged = True
-
-
-@njit(nogil=True)
-def may_split_curved(work: Hypotheses, count: int, row: Row) -> bool:
-    """Return whether a vehicle's hypotheses are split by their curvature: not while they must cover a wide guess."""
-    vehicle = row.publication.resolved == 1 and row.walk.carried == 0 and row.start.coarse == 0
-    return bool(vehicle and are_aligned_alike(work, count) and are_mounted_alike(work, count))
-
-
-@njit(nogil=True)
-def split(work: Hypotheses, count: int, angle: float, curved: float, depth: float) -> int:
-    """Split hypotheses whose angle is wider than `angle`, rad, into three along it. Return the count.
-
-    A narrower angle is split, too, where the curvature exceeds `curved`.
-
-    The weights and shifts below, and a variance along the angle of 0.451 of what it was, keep the first two moments.
-    """
-    floor = work[best_of(work, count)].log_weight - depth
-    for h in range(count):
-        variance = angle_variance(work[h].cov)
-        wide = variance > angle * angle or curvature(work[h], variance) > curved
-        if wide and work[h].log_weight > floor and count + 2 <= WORKING_HYPOTHESES:
-            _split_one(work, h, count, variance)
-            count += 2
-    return count
-
-
-@njit(nogil=True)
-def _split_one(work: Hypotheses, h: int, count: int, variance: float) -> None:
-    P = work[h].cov
-    column = work[h].delta
-    for i in range(N):
-        column[i] = P[i, YAW] + P[i, MOUNT] - P[i, PHI]
-    for i in range(N):
-        for j in range(N):
-            P[i, j] -= SPLIT_REMOVED * column[i] * column[j] / variance
-    copy_hypothesis(work, h, count)
-    copy_hypothesis(work, h, count + 1)
-    step = SPLIT_SHIFT / math.sqrt(variance)
-    for i in range(N):
-        work[count].mean[i] += step * column[i]
-        work[count + 1].mean[i] -= step * column[i]
-    work[h].log_weight += math.log(SPLIT_CENTRE)
-    work[count].log_weight += math.log(SPLIT_SIDE)
-    work[count + 1].log_weight += math.log(SPLIT_SIDE)
+        lighter = work[ib].by_weight
+        b = work[lighter]
+        if not b.merged and _are_alike(a, b):
+            lacks = max(a.log_weight - b.log_weight, 0.0)
+            if _are_close(a, b, distance * math.sqrt(1.0 + light * lacks)):
+                _merge_into(work, heavier, lighter)
+                b.merged = True
 
 
 @njit(nogil=True)

@@ -4,6 +4,7 @@ The slots of a row are a linked list. `load` unpacks them into the workspace and
 """
 
 import numpy as np
+import numpy.typing as npt
 
 from dropanchor_service.estimation.fleet.belief.layout import (
     MAX_HYPOTHESES,
@@ -13,6 +14,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     N,
     Pool,
     Row,
+    Rows,
 )
 from dropanchor_service.estimation.fleet.compiled import njit
 
@@ -26,17 +28,39 @@ def make_pool(capacity: int) -> Pool:
     return pool
 
 
-def with_room(pool: Pool, slots: int) -> Pool:
-    """Return the pool, or a larger one with the same hypotheses, that has at least `slots` free slots."""
-    size, free = len(pool), int(pool["free"][0])
-    if free >= slots:
+def fitted(pool: Pool, rows: Rows, slots: int) -> Pool:
+    """Return the pool, or one of a better size with the same hypotheses: with `slots` free slots, and few more.
+
+    rows: all that have hypotheses. In another pool those of each row lie one behind the other, which is fast to read.
+    """
+    free = int(pool["free"][0])
+    used = len(pool) - 1 - free
+    if slots <= free <= 2 * slots + used:
         return pool
-    grown = make_pool(max(size + slots, 2 * size))
-    added = len(grown) - size
-    grown["next"][-1] = pool["next"][0]
-    grown[1:size] = pool[1:]
-    grown["next"][0], grown["free"][0] = size, free + added
-    return grown
+    moved = make_pool(1 + used + slots + used // 4)
+    at = _slots_of(rows, pool)
+    raw = np.dtype((np.void, POOL_SLOT.itemsize))  # NumPy copies records field by field
+    moved.view(raw)[1 : used + 1] = pool.view(raw)[at]
+    moved["next"][1 : used + 1] = np.arange(2, used + 2)
+    moved["next"][0], moved["free"][0] = used + 1, len(moved) - 1 - used
+    ends = np.cumsum(rows["count"])
+    filled = rows["count"] > 0
+    moved["next"][ends[filled]] = -1
+    rows["first_slot"][filled] = (ends - rows["count"] + 1)[filled]
+    return moved
+
+
+def _slots_of(rows: Rows, pool: Pool) -> npt.NDArray[np.int64]:
+    """Return the slots of all hypotheses, row after row, in the order in which they are stored."""
+    counts = rows["count"].astype(np.int64)
+    slots = np.empty(counts.sum(), np.int64)
+    left = np.flatnonzero(counts)
+    at, first = rows["first_slot"][left], (np.cumsum(counts) - counts)
+    for k in range(int(counts.max(initial=0))):
+        slots[first[left] + k] = at
+        more = counts[left] > k + 1
+        left, at = left[more], pool["next"][at[more]]
+    return slots
 
 
 @njit(nogil=True)

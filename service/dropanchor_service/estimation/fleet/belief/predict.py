@@ -35,10 +35,42 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     V,
 )
 from dropanchor_service.estimation.fleet.belief.rigidity import slip_std_of
-from dropanchor_service.estimation.fleet.belief.tilt import tilting_growth
+from dropanchor_service.estimation.fleet.belief.tilt import follow_tilt, tilting_growth
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, MEASURED_HEADING, NO_HEADING, Node
 from dropanchor_service.estimation.fleet.tuning import Tuning
+
+
+@njit(nogil=True)
+def is_empty(node: Node) -> bool:
+    """Return whether no time passed since the node before: a range came with the IMU sample that ended it."""
+    return bool(node.dt_s == 0.0 and node.dyaw == 0.0 and node.dyaw_var == 0.0 and node.dv_forward == 0.0)
+
+
+@njit(nogil=True, borrows=True)
+def predict(
+    s: Floats,
+    P: Floats,
+    decay: Floats,
+    growth: Floats,
+    F: Floats,
+    A: Floats,
+    node: Node,
+    row: Row,
+    t: Tuning,
+    nlos: int,
+    bends: bool,
+    rigid: bool,
+) -> None:
+    """Predict a state and its covariance over the node: the one motion model of the filter and of the smoother.
+
+    decay, growth: from `fill_noise` and `fill_class_noise`. F and A (4, N) are scratch. bends: of `bends_tilt`.
+    """
+    predict_state(s, node, decay, F)
+    predict_covariance(P, F, decay, A)
+    add_process_noise(s, P, F, growth, node, row, t, nlos)
+    if bends:
+        follow_tilt(s, P, node, rigid, t)
 
 
 @njit(nogil=True, inline="never")
@@ -175,7 +207,6 @@ def fill_noise(decay: Floats, growth: Floats, node: Node, row: Row, t: Tuning) -
         rough = max(unsteady, min(node.dv_var, t.bending_roughness * dt)) / dt if dt > 0.0 else 0.0
     else:
         growth[V] = t.q_speed_no_acc * dt
-    growth[MOUNT] = t.q_mount * dt if row.settings.mount_angle_std > 0.0 else 0.0
     growth[SLIP] = slip_std_of(row) ** 2 * (1.0 - decay[SLIP] ** 2)
     lost, rough_var = 1.0 - decay[ACC_BIAS] ** 2, t.acc_bias_roughness * rough
     tilted = tilting_growth(node, rough)
@@ -205,7 +236,7 @@ def fill_class_noise(decay: Floats, growth: Floats, node: Node, row: Row, headin
     decay[REFERENCE], growth[REFERENCE] = follow_reference(math.exp(-node.dt_s / tau), before, after)
 
 
-@njit(nogil=True)
+@njit(nogil=True, borrows=True)
 def add_process_noise(
     s: Floats, P: Floats, F: Floats, growth: Floats, node: Node, row: Row, t: Tuning, nlos: int
 ) -> None:

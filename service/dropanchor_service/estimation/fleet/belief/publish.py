@@ -76,13 +76,13 @@ def publish(
 @njit(nogil=True)
 def _update_information(row: Row, node: Node, mean: Floats, t: Tuning) -> None:
     """Predict the information of recent ranges, and add that of this node's range."""
-    information, settings = row.publication.information, row.settings
+    information = row.publication.information
     no_acc = not math.isfinite(node.dv_var)
     predict_information(information, mean[2], node.dt_s, t.obs_q_no_acc if no_acc else t.obs_q, t)
     r2 = mean[0] ** 2 + mean[1] ** 2
-    if node.kind == RANGE and r2 > 1e-6:
+    if node.kind == RANGE and r2 > 1e-6 and row.noise.white_var > 0.0:
         c, s = mean[0] / math.sqrt(r2), mean[1] / math.sqrt(r2)
-        weight = settings.range_scale**2 / settings.range_std**2
+        weight = row.settings.range_scale**2 / (row.noise.white_var * row.noise.factor)
         information[0, 0] += c * c * weight
         information[0, 1] += c * s * weight
         information[1, 0] = information[0, 1]

@@ -16,18 +16,17 @@ correlation of the two tells such a tag from one that jolts.
 import math
 from typing import Final
 
-from dropanchor_service.estimation.fleet.belief.lateral import (
+from dropanchor_service.estimation.fleet.belief.layout import MOUNT, SLIP, Hypotheses, Hypothesis, Row, Scratch, V
+from dropanchor_service.estimation.fleet.belief.mixture import best_of
+from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.node import Node
+from dropanchor_service.estimation.fleet.measurement.lateral import (
     POWER,
     is_lateral_known,
     lateral_residual,
     lateral_variance,
 )
-from dropanchor_service.estimation.fleet.belief.layout import MOUNT, SLIP, Hypotheses, Hypothesis, Row, Scratch, V
-from dropanchor_service.estimation.fleet.belief.mixture import best_of
-from dropanchor_service.estimation.fleet.belief.mounting import is_mount_untold
-from dropanchor_service.estimation.fleet.belief.update import project, update_pda
-from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.node import Node
+from dropanchor_service.estimation.fleet.measurement.scalar import project, update_pda
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 RIGID_SLIP: Final = 0.02  # rad, of a rigid mount
@@ -67,6 +66,12 @@ def slip_std_of(row: Row) -> float:
     """Return the standard deviation of course minus body yaw in use, rad: a given one, or that of the class."""
     given, configured = row.settings.slip_given == 1, float(row.settings.slip_std)
     return configured if given or row.mount.rigid == 0 else min(configured, RIGID_SLIP)
+
+
+@njit(nogil=True)
+def is_mount_untold(row: Row, t: Tuning) -> bool:
+    """Return whether the mounting angle is no better known than that of a body axis along the course."""
+    return bool(row.settings.mount_angle_std > t.aligned_std)
 
 
 @njit(nogil=True)

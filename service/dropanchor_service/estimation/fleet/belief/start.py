@@ -1,80 +1,23 @@
-"""The first hypotheses: around a given start, or a ring of bearings and speeds at the distance of the first ranges."""
+"""What a start counts from: the kind of heading, the model of its error, and the distance of a range."""
 
 import math
 from typing import Final
 
-import numpy as np
-
 from dropanchor_service.estimation.fleet.angles import wrap
-from dropanchor_service.estimation.fleet.belief.heading_classes import add_own_error_class
-from dropanchor_service.estimation.fleet.belief.heading_models import reference_error, reset_models
-from dropanchor_service.estimation.fleet.belief.heading_reference import add_common_rotation, add_reference_error
-from dropanchor_service.estimation.fleet.belief.layout import (
-    ACC_BIAS,
-    EXACT,
-    GYRO_BIAS,
-    LEFT_BIAS,
-    MAGNETOMETER_MODEL,
-    MOUNT,
-    PHI,
-    PLATFORM_MODEL,
-    RANGE_BIAS,
-    SLIP,
-    START_RANGES,
-    YAW,
-    Anchor,
-    Anchors,
-    Floats,
-    Hypotheses,
-    R,
-    Row,
-    V,
-)
-from dropanchor_service.estimation.fleet.belief.mixture import best_of
-from dropanchor_service.estimation.fleet.belief.mounting import add_aligned, fan_mounts
-from dropanchor_service.estimation.fleet.belief.rigidity import slip_std_of
-from dropanchor_service.estimation.fleet.belief.states import NO_HEADING_YET, NO_RANGE
+from dropanchor_service.estimation.fleet.belief.heading_models import is_heading_std_given, is_north_given
+from dropanchor_service.estimation.fleet.belief.layout import MAGNETOMETER_MODEL, PLATFORM_MODEL, Anchor, Row
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import (
     ABSOLUTE_HEADING,
     DERIVED_HEADING,
-    MEASURED_HEADING,
-    MOVING,
     NO_HEADING,
-    RANGE,
     RELATIVE_HEADING,
-    RESTING,
     Node,
 )
-from dropanchor_service.estimation.fleet.frontend.preintegration import unobserved_turn_var
+from dropanchor_service.estimation.fleet.measurement.height import offset_of
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-MIN_RANGES: Final = 5  # ranges that an unknown start needs at least
-COLLECT_S: Final = 1.0  # s over which it collects them, unless it stands or START_RANGES come sooner
-STANDSTILL_S: Final = 0.7  # s that it waits at least, so that a standstill is seen
-RELATIVE_COURSE_VAR: Final = 1e-4  # rad^2, of a course that is the x axis of its frame
 ADOPT_VAR: Final = 0.04  # rad^2, of north below which poses are in the site frame
-REST_SPEED_VAR: Final = 0.01  # (m/s)^2
-
-
-@njit(nogil=True)
-def _initialise(work: Hypotheses, h: int, row: Row, node: Node, yaw: float, yaw_var: float, t: Tuning) -> None:
-    """Fill all of a hypothesis that does not depend on where the tag is."""
-    s, P, settings = work[h].mean, work[h].cov, row.settings
-    s[:] = 0.0
-    P[:] = 0.0
-    s[YAW] = yaw
-    s[MOUNT] = settings.mount_angle
-    s[RANGE_BIAS] = settings.range_bias
-    P[YAW, YAW] = yaw_var
-    P[MOUNT, MOUNT] = settings.mount_angle_std**2
-    P[SLIP, SLIP] = slip_std_of(row) ** 2
-    P[GYRO_BIAS, GYRO_BIAS] = max(settings.gyro_bias_std**2, node.gyro_bias_var)
-    P[ACC_BIAS, ACC_BIAS], P[LEFT_BIAS, LEFT_BIAS] = t.acc_bias_std**2, t.left_bias_std**2
-    P[RANGE_BIAS, RANGE_BIAS] = settings.range_bias_std**2
-    work[h].log_weight = 0.0
-    work[h].heading_class = EXACT
-    work[h].nlos = work[h].reverse = work[h].aligned = 0
 
 
 @njit(nogil=True)
@@ -91,6 +34,18 @@ def uses_heading(row: Row, node: Node) -> bool:
 
 
 @njit(nogil=True)
+def starts_at_place(row: Row) -> bool:
+    """Return whether a row starts where the operator said, or where it was before a gap."""
+    return bool(row.start.known == 1 or row.start.after_gap == 1)
+
+
+@njit(nogil=True)
+def is_yaw_known(row: Row, node: Node) -> bool:
+    """Return whether a row that starts at a place knows its yaw there."""
+    return math.isfinite(row.start.heading) or is_in_site_frame(node.heading_kind)
+
+
+@njit(nogil=True)
 def choose_model(row: Row, node: Node, t: Tuning) -> None:
     """Set the model of the heading error where the kind of heading gives it.
 
@@ -99,112 +54,16 @@ def choose_model(row: Row, node: Node, t: Tuning) -> None:
     settings = row.settings
     if node.heading_kind == ABSOLUTE_HEADING:
         row.heading.model = MAGNETOMETER_MODEL
-        if row.start.known == 1 and math.isfinite(row.start.heading):
+        if row.start.known == 1 and math.isfinite(row.start.heading) and not is_north_given(row):
             row.heading.north = wrap(node.heading - row.start.heading)
-    elif is_in_site_frame(node.heading_kind) and math.isfinite(settings.heading_std):
+    if is_in_site_frame(node.heading_kind) and is_heading_std_given(row):
         settings.reference_std = settings.heading_std
     if node.heading_kind == DERIVED_HEADING:
         row.heading.model = PLATFORM_MODEL
-        settings.mount_angle_std = min(settings.mount_angle_std, t.platform_mount_std)
+        settings.mount_angle_std = min(settings.mount_angle_std, t.mount_known_std)
         settings.slip_tau = t.platform_slip_tau
         if settings.slip_given == 0:
             settings.slip_std = t.platform_slip_std
-
-
-@njit(nogil=True)
-def _bearings(row: Row, t: Tuning) -> int:
-    """Return the number of directions of a ring."""
-    return t.coarse_bearings if row.start.coarse == 1 else t.start_bearings
-
-
-@njit(nogil=True)
-def start_known(work: Hypotheses, row: Row, anchor: Anchor, node: Node, t: Tuning) -> int:
-    """Make hypotheses at the given start: one per heading class, or a ring of headings where none is known.
-
-    After a gap the start is in the frame in which the tag was. Return their count.
-    """
-    start, gap = row.start, row.gap
-    x, y = start.x - anchor.x, start.y - anchor.y
-    r = max(math.hypot(x, y), 1e-3)
-    given = math.isfinite(start.heading)
-    known = given or is_in_site_frame(node.heading_kind)
-    ring = 1 if known else _bearings(row, t)
-    cell = 2.0 * math.pi / ring
-    choose_model(row, node, t)
-    for h in range(ring):
-        yaw = start.heading if given else node.heading - row.heading.north + cell * h
-        variance = start.heading_std**2 if given else node.heading_var
-        _initialise(work, h, row, node, yaw, variance if known else (cell / 2.0) ** 2, t)
-        s, P = work[h].mean, work[h].cov
-        s[R], s[PHI] = r, math.atan2(y, x)
-        P[R, R] = start.std**2
-        P[PHI, PHI] = (start.std / r) ** 2
-        P[V, V] = start.speed_std**2
-        if start.coarse == 1 and not known:
-            turned = wrap(yaw - gap.yaw)
-            work[h].log_weight = -0.5 * turned * turned / (gap.yaw_var + unobserved_turn_var(gap.turn_s))
-    row.heading.in_site_frame = 0 if start.after_gap == 1 and gap.relative == 1 else 1
-    if not is_in_site_frame(node.heading_kind):
-        count = ring + add_aligned(work, ring, row, t)
-    else:
-        _, slow, _ = reference_error(row, node.heading_var)
-        add_reference_error(work[0].cov, slow, not given)
-        count = ring + add_own_error_class(work, 0, ring, row, t, not given)
-    return count + fan_mounts(work, count, row, t) if ring == 1 else count
-
-
-@njit(nogil=True)
-def _start_ring(
-    work: Hypotheses, row: Row, horizontal: float, node: Node, yaw: float, yaw_var: float, t: Tuning
-) -> int:
-    """Make hypotheses for all bearings and speeds, each with a standard deviation of half a cell. Return their count.
-
-    Speeds are forward unless the tag may reverse. The numbers of the tuning keep the count within MAX_HYPOTHESES.
-    """
-    at_rest, relative = node.rest == RESTING, row.heading.in_site_frame == 0
-    signs = 2 if row.settings.reverse_allowed == 1 and not at_rest else 1
-    bearings = _bearings(row, t)
-    speeds = 1 if at_rest else (t.coarse_speeds if row.start.coarse == 1 else t.start_speeds) // signs
-    cell = 2.0 * math.pi / bearings
-    speed_cell = min(t.start_speed_max, row.settings.speed_max) / speeds
-    h = 0
-    for i in range(bearings):
-        for k in range(speeds):
-            for g in range(signs):
-                _initialise(work, h, row, node, yaw, yaw_var, t)
-                s, P = work[h].mean, work[h].cov
-                s[R], s[PHI] = horizontal, cell * i
-                _spread_ring(P, row, cell, relative)
-                s[V] = 0.0 if at_rest else (1.0 - 2.0 * g) * speed_cell * (k + 0.5)
-                work[h].reverse = g
-                P[V, V] = REST_SPEED_VAR if at_rest else (speed_cell / 2.0) ** 2
-                if not relative and is_in_site_frame(node.heading_kind):
-                    _, slow, _ = reference_error(row, node.heading_var)
-                    add_common_rotation(P, slow)
-                h += 1
-    return h
-
-
-@njit(nogil=True)
-def _spread_ring(P: Floats, row: Row, cell: float, relative: bool) -> None:
-    """Fill the covariance of distance and bearing of one cell of the ring.
-
-    distance = (measured - bias) / scale, so it shares the error of the bias. An error of the mounting angle turns
-    everything about the anchor: the ring covers the angle between mounting and bearing. In a frame of the tag's own
-    the course is given instead, and the mounting angle turns only the body.
-    """
-    settings = row.settings
-    bias_var = settings.range_bias_std**2
-    P[R, R] = (settings.range_std**2 / 4.0 + bias_var) / settings.range_scale**2
-    P[R, RANGE_BIAS] = P[RANGE_BIAS, R] = -bias_var / settings.range_scale
-    P[PHI, PHI] = (cell / 2.0) ** 2
-    mount_var = settings.mount_angle_std**2
-    if relative:
-        P[YAW, YAW] += mount_var
-        P[YAW, MOUNT] = P[MOUNT, YAW] = -mount_var
-    else:
-        P[PHI, PHI] += mount_var
-        P[PHI, MOUNT] = P[MOUNT, PHI] = mount_var
 
 
 @njit(nogil=True)
@@ -214,77 +73,7 @@ def start_distance(row: Row, z: float) -> float:
 
 
 @njit(nogil=True)
-def collect_start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: Tuning) -> int:
-    """Collect what a start needs, and make the first hypotheses once it is there. Return their count."""
-    start = row.start
-    start.collected_s += node.dt_s
-    if node.kind == RANGE and row.anchor < 0:
-        row.anchor = node.anchor
-    if node.heading_kind == NO_HEADING:
-        row.publication.reason = NO_HEADING_YET
-        return 0
-    if node.heading_kind == MEASURED_HEADING and row.heading.bank_started == 0:
-        reset_models(row, node.heading, node.heading_var, t)
-    if row.anchor < 0:
-        row.publication.reason = NO_RANGE
-        return 0
-    anchor = anchors[row.anchor]
-    north = is_in_site_frame(node.heading_kind)
-    if start.after_gap == 1 and start.known == 0 and row.gap.relative == 1 and north:
-        start.after_gap = 0  # the place before the gap is not one of the site
-    if start.known == 1 or start.after_gap == 1:
-        return start_known(work, row, anchor, node, t)
-    if node.kind == RANGE and node.anchor == row.anchor:
-        start.ranges[start.range_count % START_RANGES] = start_distance(row, node.z)
-        start.range_count += 1
-    sooner = node.rest == RESTING or start.range_count >= START_RANGES
-    enough = (sooner and start.collected_s >= STANDSTILL_S) or start.collected_s >= COLLECT_S
-    if start.range_count < MIN_RANGES or not enough:
-        row.publication.reason = NO_RANGE
-        return 0
-    slant = float(np.median(start.ranges[: min(start.range_count, START_RANGES)]))
-    return _start_unknown(work, row, _horizontal(row, anchor, slant), node, t)
-
-
-@njit(nogil=True)
-def _start_unknown(work: Hypotheses, row: Row, horizontal: float, node: Node, t: Tuning) -> int:
-    """Make a ring of hypotheses in the site frame if north is known, else in a frame of the tag's own.
-
-    The x axis of such a frame is the direction in which the tag travels first. Return their count.
-    """
-    magnetic = node.heading_kind == ABSOLUTE_HEADING
-    if is_in_site_frame(node.heading_kind) and not (magnetic and node.heading_var > ADOPT_VAR):
-        choose_model(row, node, t)
-        row.heading.in_site_frame = 1
-        return _start_ring(work, row, horizontal, node, node.heading, node.heading_var, t)
-    row.heading.in_site_frame = 0
-    return _start_ring(work, row, horizontal, node, -row.settings.mount_angle, RELATIVE_COURSE_VAR, t)
-
-
-@njit(nogil=True)
-def _horizontal(row: Row, anchor: Anchor, slant: float) -> float:
+def horizontal_distance(row: Row, anchor: Anchor, slant: float) -> float:
     """Return the horizontal distance, m, of a tag at the distance `slant`."""
-    return math.sqrt(max(slant**2 - (row.settings.height - anchor.z) ** 2, 0.01))
-
-
-@njit(nogil=True)
-def restart_on_ring(work: Hypotheses, count: int, row: Row, node: Node, anchor: Anchor, t: Tuning) -> int:
-    """Replace all hypotheses by a ring at the distance of the node's range. Return their count.
-
-    The ranges contradict the track, but not its yaw: that comes from gyroscope and heading, and is kept.
-    """
-    best = work[best_of(work, count)]
-    yaw, variance = best.mean[YAW], best.cov[YAW, YAW]
-    row.start.known = row.start.after_gap = row.start.coarse = 0
-    row.publication.resolved = 0
-    row.publication.resolved_s = 0.0
-    node.rest = MOVING  # a standstill that was wrong may be why the track is
-    nlos = row.nlos
-    nlos.high_run = nlos.low_run = nlos.widened = 0
-    nlos.misfit = nlos.misfit_s = 0.0
-    horizontal = _horizontal(row, anchor, start_distance(row, node.z))
-    if row.heading.in_site_frame == 0:
-        return _start_unknown(work, row, horizontal, node, t)
-    if uses_heading(row, node):
-        yaw, variance = node.heading - row.heading.north, node.heading_var
-    return _start_ring(work, row, horizontal, node, yaw, variance, t)
+    dz = offset_of(row.settings, row.settings.height - anchor.z, slant)
+    return math.sqrt(max(slant**2 - dz**2, 0.01))

@@ -1,14 +1,20 @@
 """Run the pose belief of many rows over a batch of nodes, in one compiled call."""
 
-import math
-from typing import Final
-
-from dropanchor_service.estimation.fleet.belief.carried import (
-    follow_motion,
-    start_carried,
-    update_with_steps,
-    was_walked_off,
+from dropanchor_service.estimation.fleet.belief.births.carrying import was_walked_off
+from dropanchor_service.estimation.fleet.belief.births.first import restart_on_ring
+from dropanchor_service.estimation.fleet.belief.births.forgetting import GAP, NOISE, PLACE, TRACK, forget
+from dropanchor_service.estimation.fleet.belief.births.moments import (
+    after_prediction,
+    after_range,
+    at_class_check,
+    at_reduction,
+    at_start,
+    before_prediction,
+    before_range,
+    place_in_site,
 )
+from dropanchor_service.estimation.fleet.belief.births.rotations import tells_rotation
+from dropanchor_service.estimation.fleet.belief.births.sight import contradicts_ranges
 from dropanchor_service.estimation.fleet.belief.gap import (
     accumulate_gap,
     is_stuck,
@@ -17,15 +23,13 @@ from dropanchor_service.estimation.fleet.belief.gap import (
     publish_suspended,
     restart_from_gap,
 )
-from dropanchor_service.estimation.fleet.belief.heading_classes import keep_both_classes
-from dropanchor_service.estimation.fleet.belief.lateral import is_lateral_known, update_lateral
+from dropanchor_service.estimation.fleet.belief.heading_update import update_with_heading
 from dropanchor_service.estimation.fleet.belief.layout import (
     CLASSES,
     MAX_HYPOTHESES,
     Anchors,
     Belief,
     Beliefs,
-    Floats,
     Hypotheses,
     Pool,
     Row,
@@ -33,62 +37,33 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Scratch,
     V,
 )
-from dropanchor_service.estimation.fleet.belief.measurements import (
-    update_with_bearing,
-    update_with_heading,
-    update_with_range,
-)
 from dropanchor_service.estimation.fleet.belief.mixture import (
     all_finite,
     best_of,
     keep_heaviest,
     max_hypotheses,
-    may_split_curved,
     merge,
     normalise,
     prune,
-    split,
 )
-from dropanchor_service.estimation.fleet.belief.nlos import (
-    close_nlos,
-    contradicts_ranges,
-    expect_los,
-    propose_alternatives,
-    widen_after_misfit,
-)
-from dropanchor_service.estimation.fleet.belief.placing import place_in_site, tells_rotation
 from dropanchor_service.estimation.fleet.belief.pool import load, mirror, release, store
-from dropanchor_service.estimation.fleet.belief.predict import (
-    add_process_noise,
-    fill_class_noise,
-    fill_noise,
-    predict_covariance,
-    predict_state,
-)
+from dropanchor_service.estimation.fleet.belief.predict import fill_class_noise, fill_noise, is_empty, predict
 from dropanchor_service.estimation.fleet.belief.publish import publish
 from dropanchor_service.estimation.fleet.belief.rigidity import RIGID_SLIP, follow_mount, slip_std_of, weight_power
-from dropanchor_service.estimation.fleet.belief.standing import judge_standstill, offer_refused, offer_turnabout
-from dropanchor_service.estimation.fleet.belief.start import (
-    collect_start,
-    is_in_site_frame,
-    restart_on_ring,
-    uses_heading,
-)
-from dropanchor_service.estimation.fleet.belief.states import FAULT, INITIALISING
-from dropanchor_service.estimation.fleet.belief.tilt import bends_tilt, follow_tilt
-from dropanchor_service.estimation.fleet.belief.update import update_standstill
+from dropanchor_service.estimation.fleet.belief.start import is_in_site_frame, uses_heading
+from dropanchor_service.estimation.fleet.belief.states import FAULT
+from dropanchor_service.estimation.fleet.belief.tilt import bends_tilt
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, Node, Nodes
+from dropanchor_service.estimation.fleet.measurement.bearing import update_with_bearing
+from dropanchor_service.estimation.fleet.measurement.height import take_height
+from dropanchor_service.estimation.fleet.measurement.lateral import update_lateral
+from dropanchor_service.estimation.fleet.measurement.range import update_with_range
+from dropanchor_service.estimation.fleet.measurement.rest import update_standstill
+from dropanchor_service.estimation.fleet.measurement.steps import update_steps
 from dropanchor_service.estimation.fleet.tuning import Tuning, TuningRecord
 
 REDUCE_EVERY, CHECK_CLASSES_EVERY = 0.1, 2.0  # s between merging and splitting, between looking at heading classes
-SPLIT_DEPTH: Final = 6.0  # log weight below the best at which a hypothesis is not split
-
-
-@njit(nogil=True)
-def _is_empty(node: Node) -> bool:
-    """Return whether no time passed since the node before: a range came with the IMU sample that ended it."""
-    return bool(node.dt_s == 0.0 and node.dyaw == 0.0 and node.dyaw_var == 0.0 and node.dv_forward == 0.0)
 
 
 @njit(nogil=True)
@@ -97,13 +72,13 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
 
     The accelerometer of a rigid mount then corrects them by the increment of velocity across the course.
     """
-    if _is_empty(node):
+    if is_empty(node):
         return
     decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
     lateral, slip_std = follow_mount(work, count, row, node, t, scratch), slip_std_of(row)
     rigid = slip_std <= RIGID_SLIP
     power = weight_power(row, rigid, t)
-    bends = bends_tilt(node) and (rigid or is_lateral_known(node))
+    bends = bends_tilt(node, rigid)
     fill_noise(decay, growth, node, row, t)
     for heading_class in range(CLASSES):
         filled = False
@@ -112,54 +87,22 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
                 if not filled:
                     fill_class_noise(decay, growth, node, row, heading_class, t)
                     filled = True
-                predict_state(work[h].mean, node, decay, F)
-                predict_covariance(work[h].cov, F, decay, FP)
-                add_process_noise(work[h].mean, work[h].cov, F, growth, node, row, t, work[h].nlos)
-                if bends:
-                    follow_tilt(work[h].mean, work[h].cov, node, rigid, t)
+                predict(work[h].mean, work[h].cov, decay, growth, F, FP, node, row, t, work[h].nlos, bends, rigid)
                 if lateral:
                     update_lateral(work[h], scratch, node, row, slip_std, power)
 
 
 @njit(nogil=True)
-def _reduce_mixture(work: Hypotheses, count: int, row: Row, node: Node, PH: Floats, t: Tuning) -> int:
-    """Normalise and prune; now and then merge, split and keep both heading classes. Return the count."""
-    normalise(work, count)
-    count = prune(work, count, t.prune_depth)
-    row.since_reduction_s += node.dt_s
-    row.since_class_check_s += node.dt_s
-    if row.since_reduction_s >= REDUCE_EVERY:
-        row.since_reduction_s = 0.0
-        moving = node.rest == MOVING
-        if count > 1:
-            count = merge(work, count, t.merge_distance if moving else t.merge_distance_at_rest, t.merge_light)
-        if moving:  # only a motion makes a wide angle non-linear
-            angle = t.coarse_split_angle if row.start.coarse == 1 else t.split_angle
-            if row.walk.carried == 1:
-                angle = t.walk_split_angle
-            curved = t.split_curvature if may_split_curved(work, count, row) else math.inf
-            count = split(work, count, angle, curved, SPLIT_DEPTH)
-        count = keep_heaviest(work, count, max_hypotheses(row, t))
-    if row.since_class_check_s >= CHECK_CLASSES_EVERY and uses_heading(row, node):
-        row.since_class_check_s = 0.0
-        count = keep_both_classes(work, count, row, node, PH, t)
-    return count
-
-
-@njit(nogil=True)
-def _follow_motion_of(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> int:
-    """Predict all hypotheses over the node, and fuse its heading, rest and steps. Return their count."""
-    count = follow_motion(work, count, row, node, t)
-    judge_standstill(work, count, row, node, t)
-    count = offer_turnabout(work, count, row, node, t)
-    _predict_all(work, count, row, node, t, scratch)
+def _fuse_motion(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> int:
+    """Fuse the node's heading, rest and steps. Return the count of hypotheses."""
     if is_in_site_frame(node.heading_kind):
         count = update_with_heading(work, count, row, node, t, scratch)
     if node.rest != MOVING:
         for h in range(count):
             work[h].log_weight += update_standstill(work[h].mean, work[h].cov, scratch.PH, node, t)
     if node.carried == 1:
-        count = update_with_steps(work, count, node, t, scratch)
+        for h in range(count):
+            update_steps(work[h], scratch, node, t)
     return count
 
 
@@ -169,17 +112,36 @@ def _fuse_measurement(
 ) -> int:
     """Fuse the node's range or bearing, unless only a frame of the site gives it a meaning. Return the count."""
     if row.heading.in_site_frame == 0 and tells_rotation(row, node):
-        count = place_in_site(work, count, row)
+        count = place_in_site(work, count, row, node, t, scratch)
         if row.heading.in_site_frame == 0:
             return count
     if node.kind == RANGE and row.anchor >= 0 and not belief.stuck:
-        count = offer_refused(work, count, node, t)
+        count = before_range(work, count, row, node, t, scratch)
         update_with_range(work, count, row, node, anchors, t, scratch, belief)
         row.since_range_s = 0.0
-        count = propose_alternatives(work, count, row, t)
-        close_nlos(work, count, scratch.PH, t)
+        count = after_range(work, count, row, node, t, scratch)
     if node.kind == BEARING and row.anchor >= 0:
         update_with_bearing(work, count, row, node, anchors, t, scratch, belief)
+    return count
+
+
+@njit(nogil=True)
+def _reduce_mixture(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> int:
+    """Normalise and prune; now and then merge, split and keep both heading classes. Return the count."""
+    normalise(work, count)
+    count = prune(work, count, t.prune_depth)
+    row.since_reduction_s += node.dt_s
+    row.since_class_check_s += node.dt_s
+    if row.since_reduction_s >= REDUCE_EVERY:
+        row.since_reduction_s = 0.0
+        if count > 1:
+            distance = t.merge_distance if node.rest == MOVING else t.merge_distance_at_rest
+            count = merge(work, count, distance, t.merge_light)
+        count = at_reduction(work, count, row, node, t, scratch)
+        count = keep_heaviest(work, count, max_hypotheses(row, t))
+    if row.since_class_check_s >= CHECK_CLASSES_EVERY and uses_heading(row, node):
+        row.since_class_check_s = 0.0
+        count = at_class_check(work, count, row, node, t, scratch)
     return count
 
 
@@ -187,37 +149,14 @@ def _fuse_measurement(
 def _run_node(
     work: Hypotheses, count: int, row: Row, node: Node, anchors: Anchors, t: Tuning, scratch: Scratch, belief: Belief
 ) -> int:
-    """Predict and update a row that has hypotheses. Return their count, 0 where the numbers are not finite."""
-    count = _follow_motion_of(work, count, row, node, t, scratch)
-    row.since_range_s += node.dt_s
-    widen_after_misfit(work, count, row, node, t)
-    count = expect_los(work, count, row, node.dt_s, t)
+    """Take a node into a row that has hypotheses. Return their count, 0 where the numbers are not finite."""
+    count = before_prediction(work, count, row, node, t, scratch)
+    _predict_all(work, count, row, node, t, scratch)
+    count = _fuse_motion(work, count, row, node, t, scratch)
+    count = after_prediction(work, count, row, node, t, scratch)
     belief.stuck = is_stuck(row, node, work[best_of(work, count)].mean[V])
     count = _fuse_measurement(work, count, row, node, anchors, t, scratch, belief)
-    if not all_finite(work, count):
-        return 0
-    count = _reduce_mixture(work, count, row, node, scratch.PH, t)
-    for h in range(count):
-        mirror(work[h].cov)
-    return count
-
-
-@njit(nogil=True)
-def _reset_row(row: Row, pool: Pool) -> None:
-    """Forget all hypotheses, so that the row starts again."""
-    release(row, pool)
-    row.start.range_count = 0
-    row.start.collected_s = 0.0
-    row.heading.bank_started = row.heading.model = row.heading.in_site_frame = 0
-    row.heading.slow_var = 0.0
-    row.publication.resolved = 0
-    row.publication.state = INITIALISING
-    row.publication.information[:] = 0.0
-    row.publication.resolved_s = 0.0
-    row.nlos.misfit = row.nlos.misfit_s = 0.0
-    row.nlos.widened = 0
-    row.walk.carried = 0
-    row.walk.var = 0.0
+    return _reduce_mixture(work, count, row, node, t, scratch) if all_finite(work, count) else 0
 
 
 @njit(nogil=True)
@@ -225,9 +164,39 @@ def _reset_after_fault(row: Row, pool: Pool) -> None:
     """Start a row again whose numbers were not finite. It is no longer where it started."""
     row.faults += 1
     row.publication.reason = FAULT
-    row.start.known = row.start.after_gap = 0
-    row.gap.unobserved_s = 0.0
-    _reset_row(row, pool)
+    release(row, pool)
+    forget(row, PLACE | GAP | TRACK | NOISE)
+
+
+@njit(nogil=True)
+def _follow(
+    work: Hypotheses,
+    count: int,
+    row: Row,
+    pool: Pool,
+    node: Node,
+    anchors: Anchors,
+    t: Tuning,
+    scratch: Scratch,
+    belief: Belief,
+) -> int:
+    """Take a node into a row that has hypotheses, which start again where they are wrong. Return their count."""
+    count = _run_node(work, count, row, node, anchors, t, scratch, belief)
+    if count == 0:
+        _reset_after_fault(row, pool)
+    elif node.kind == RANGE and node.anchor == row.anchor and contradicts_ranges(work, count, row, t):
+        return restart_on_ring(work, count, row, node, anchors[row.anchor], t)
+    return count
+
+
+@njit(nogil=True)
+def _start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: Tuning, scratch: Scratch) -> int:
+    """Take a node into a row without hypotheses, and make the first ones where it has enough. Return their count."""
+    if is_suspended(row, node):
+        return 0
+    if row.gap.unobserved_s > 0.0:
+        restart_from_gap(row, anchors[row.anchor], t)
+    return at_start(work, row, node, anchors, t, scratch)
 
 
 @njit(nogil=True)
@@ -242,27 +211,16 @@ def _advance_row(
     scratch: Scratch,
     belief: Belief,
 ) -> int:
-    """Take one node into the row, which starts or starts again where it must. Return the count of hypotheses."""
+    """Take one node into the row. Return the count of hypotheses."""
     if count > 0:
         accumulate_gap(work, count, row, node)
-        if not is_track_lost(row, node) and not was_walked_off(row, node):
-            count = _run_node(work, count, row, node, anchors, t, scratch, belief)
-            if count == 0:
-                _reset_after_fault(row, pool)
-            elif node.kind == RANGE and node.anchor == row.anchor and contradicts_ranges(work, count, row, t):
-                count = restart_on_ring(work, count, row, node, anchors[row.anchor], t)
-            return count
-        _reset_row(row, pool)
-    if is_suspended(row, node):
-        return 0
-    if row.gap.unobserved_s > 0.0:
-        restart_from_gap(row, anchors[row.anchor])
-    count = collect_start(work, row, node, anchors, t)
-    if count > 0 and node.carried == 1:
-        count = start_carried(work, count, row, node, t)
-    for h in range(count):
-        mirror(work[h].cov)
-    return count
+    if count > 0 and (is_track_lost(row, node) or was_walked_off(row, node, t)):
+        release(row, pool)
+        forget(row, TRACK)
+        count = 0
+    if count > 0:
+        return _follow(work, count, row, pool, node, anchors, t, scratch, belief)
+    return _start(work, row, node, anchors, t, scratch)
 
 
 @njit(nogil=True, cache=True)
@@ -289,7 +247,10 @@ def advance(
         row = rows[current]
         row.t_ns = node.t_ns
         belief = beliefs[k]
+        take_height(row, node, belief)
         count = _advance_row(work, count, row, pool, node, anchors, t, scratch, belief)
+        for h in range(count):
+            mirror(work[h].cov)
         if count > 0:
             publish(work, count, row, node, anchors, t, belief, scratch)
         elif row.gap.unobserved_s > 0.0:

@@ -23,7 +23,6 @@ noise of the accelerations already holds what the tilt does in that time.
 import math
 from typing import Final
 
-from dropanchor_service.estimation.fleet.belief.lateral import increments
 from dropanchor_service.estimation.fleet.belief.layout import (
     ACC_BIAS,
     GYRO_BIAS,
@@ -38,6 +37,7 @@ from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.attitude import TAU
 from dropanchor_service.estimation.fleet.frontend.node import MOVING, Node
 from dropanchor_service.estimation.fleet.frontend.preintegration import G0
+from dropanchor_service.estimation.fleet.measurement.lateral import increments, is_lateral_known
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 TILTING_S: Final = 25.0  # s, in which the biases gain the whole tilt of an unknown gyroscope
@@ -55,12 +55,16 @@ def tilting_growth(node: Node, rough: float) -> float:
 
 
 @njit(nogil=True)
-def bends_tilt(node: Node) -> bool:
-    """Return whether the accelerometer of a ground vehicle was used over the node while it moved."""
-    return bool(node.rest == MOVING and node.carried == 0 and node.dt_s > 0.0 and math.isfinite(node.dv_var))
+def bends_tilt(node: Node, rigid: bool) -> bool:
+    """Return whether the accelerometer of a ground vehicle was used over the node while it moved.
+
+    On a mount that may be loose a rough ride tells no arc.
+    """
+    moves = node.rest == MOVING and node.carried == 0 and node.dt_s > 0.0 and math.isfinite(node.dv_var)
+    return bool(moves and (rigid or is_lateral_known(node)))
 
 
-@njit(nogil=True)
+@njit(nogil=True, borrows=True)
 def follow_tilt(s: Floats, P: Floats, node: Node, rigid: bool, t: Tuning) -> None:
     """Take what the tilt filter made of the node into a state that was predicted over it."""
     if rigid:
@@ -90,6 +94,23 @@ def predict_tilt(s: Floats, P: Floats, node: Node) -> None:
         a = by_bias * P[ACC_BIAS, i] + by_course * turned
         b = P[LEFT_BIAS, i] + by_speed * P[V, i] + by_gyro * P[GYRO_BIAS, i]
         P[ACC_BIAS, i], P[LEFT_BIAS, i] = c * a + n * b, c * b - n * a
+
+
+@njit(nogil=True)
+def turn_columns(C: Floats, s: Floats, node: Node) -> None:
+    """Do to the columns of C, covariances with the predicted state, what `predict_tilt` does to that state.
+
+    s: before `predict_tilt`. Only its derivative is needed here; a test compares the two.
+    """
+    w = node.dyaw - s[GYRO_BIAS] * node.dt_s
+    share = node.tilt_gain / node.dt_s
+    _, across = increments(node, s[MOUNT] + s[SLIP] + w / 2)
+    c, n = math.cos(w), math.sin(w)
+    for i in range(N):
+        turned = C[i, MOUNT] + C[i, SLIP] - C[i, GYRO_BIAS] * node.dt_s / 2
+        a = (1.0 + min(node.tilt_gain, node.dt_s / TAU)) * C[i, ACC_BIAS] - share * across * turned
+        b = C[i, LEFT_BIAS] - share * w * C[i, V] + node.tilt_gain * s[V] * C[i, GYRO_BIAS]
+        C[i, ACC_BIAS], C[i, LEFT_BIAS] = c * a + n * b, c * b - n * a
 
 
 @njit(nogil=True)

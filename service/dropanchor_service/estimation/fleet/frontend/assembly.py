@@ -6,7 +6,8 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.event import HEADING_EVENT, Event
+from dropanchor_service.estimation.fleet.frontend.event import HEADING_EVENT, PRESSURE_EVENT, Event
+from dropanchor_service.estimation.fleet.frontend.height import add_pressure, height_at
 from dropanchor_service.estimation.fleet.frontend.inertial import add_sample, close_node
 from dropanchor_service.estimation.fleet.frontend.lever import apply_lever
 from dropanchor_service.estimation.fleet.frontend.node import NO_MEASUREMENT, RANGE, Node, Nodes
@@ -81,12 +82,13 @@ def assemble_nodes(
     fronts: Array,
     platforms: Array,
     rows: Array,
+    heights: Array,
     nodes: Nodes,
     verdicts: Array,
 ) -> int:
     """Fill `nodes` from the samples in `order`, which index IMU and, behind it, EVENT. Return the number of nodes.
 
-    verdicts: what became of each IMU sample.
+    verdicts: what became of each IMU sample. The anchor of a pressure receives what became of it.
     """
     n = 0
     for k in range(len(order)):
@@ -104,6 +106,9 @@ def assemble_nodes(
             event = events[index - len(imu)]
             r, t_ns = event.row, event.t_ns
             row, front, platform = rows[r], fronts[r], platforms[r]
+            if event.kind == PRESSURE_EVENT:
+                event.anchor = add_pressure(heights, r, t_ns, event.value, event.std)
+                continue
             if event.kind == HEADING_EVENT:
                 if row.settings.heading_source != IMU_ONLY:
                     add_reading(platform, front, t_ns, event.value, event.std)
@@ -112,6 +117,7 @@ def assemble_nodes(
             _close(front, platform, row, t_ns, node)
             if event.kind != HEADING_EVENT:
                 _measure(node, event, row, platform)
+        height_at(heights[r], node.t_ns, node)
         node.row = r
         n += 1
     return n

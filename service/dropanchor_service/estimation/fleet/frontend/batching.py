@@ -15,7 +15,7 @@ REORDER_WINDOW: Final = 250_000_000  # ns in which late samples are put in order
 MARGIN: Final = 150_000_000  # ns, for batches that come later than those before
 FORGET: Final = 30_000_000_000  # ns of samples, after which a wait that no batch needs ends, or twice that
 MAX_DELAY: Final = 1_000_000_000  # ns behind at which the last part of a batch may end: a later end is a slow clock
-MAX_LAG_S: Final = 3.5
+MAX_LAG_S: Final = 3.5  # s that a range waits for the IMU samples of its time, at most
 
 BATCHING: Final = np.dtype(
     [

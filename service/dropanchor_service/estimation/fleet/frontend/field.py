@@ -49,7 +49,7 @@ FIELD_WALK = 0.013  # of r, per sqrt(s)
 IRON_WALK = 0.02  # of r, per sqrt(s): motors near by
 YAW_WALK = 1e-6  # rad^2/s, the gyroscope's white noise
 BIAS_SD = 1.5e-3  # rad/s, of what rest has left
-SCALE_SD = 7e-3
+SCALE_SD = 7e-3  # of the turn, error of the gyroscope's scale
 BIAS_WALK = 1e-10  # (rad/s)^2/s
 
 

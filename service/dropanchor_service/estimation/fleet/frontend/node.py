@@ -61,6 +61,9 @@ NODE: Final = np.dtype(
         ("gait_angle", np.float64),  # rad, direction of the steps minus body yaw
         ("gait_coherence", np.float64),  # 0 to 1; 0: there is no such angle
         ("turned", np.float64),  # rad, of a quick turn that has just ended; 0: none
+        ("height", np.float64),  # m, of the tag at the end of the interval, where it is not as told
+        ("height_std", np.float64),  # m; 0: the height is as told
+        ("height_source", np.uint8),  # TOLD, BY_PRESSURE or UNKNOWN of `height`
     ]
 )
 

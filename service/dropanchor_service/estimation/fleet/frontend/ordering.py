@@ -88,7 +88,7 @@ class SampleQueue:
 
         Raises IndexError for a sample of a row that is not configured.
         """
-        columns = (samples.imu, samples.headings, samples.ranges, samples.bearings)
+        columns = (samples.imu, samples.headings, samples.ranges, samples.bearings, samples.pressures)
         count = sum(map(len, columns))
         self._reserve(count, count - len(samples.imu))
         queues = self._queues[: self._rows]

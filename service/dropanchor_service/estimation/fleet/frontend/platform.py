@@ -45,7 +45,7 @@ NOISE = 1.6e-5  # rad^2/s, of a platform's increments
 READING_STD = 0.1  # rad, of a reading whose std is not told
 EXTRAPOLATE = 0.25  # s
 STILL_RATE = 0.03  # rad/s
-STILL_RANGES = 5
+STILL_RANGES = 5  # ranges that agree with a tag that stands
 
 
 @njit(nogil=True)

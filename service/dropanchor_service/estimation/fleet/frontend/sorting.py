@@ -19,6 +19,7 @@ from dropanchor_service.estimation.fleet.frontend.event import (
     IMU_EVENT,
     LATE,
     NOT_FINITE,
+    PRESSURE_EVENT,
     RANGE_EVENT,
     Event,
 )
@@ -58,6 +59,7 @@ def order_samples(
     headings: Array,
     ranges: Array,
     bearings: Array,
+    pressures: Array,
     anchors: int,
     queues: Array,
     pending: Pending,
@@ -70,22 +72,27 @@ def order_samples(
     changed, where a sample belongs to a row that is not configured.
     """
     rows = len(queues)
-    if not (_within(imu, rows) and _within(headings, rows) and _within(ranges, rows) and _within(bearings, rows)):
+    measured = _within(headings, rows) and _within(ranges, rows) and _within(bearings, rows)
+    if not (_within(imu, rows) and measured and _within(pressures, rows)):
         return NONE
     batch.counts[:] = 0
     _add_imu(imu, queues, batch.following, batch.times, batch.touched, batch)
     for k in range(len(headings)):
         sample = headings[k]
-        _add_event(len(imu), sample, sample.heading, HEADING_EVENT, NONE, queues, batch)
+        _add_event(len(imu), sample, sample.heading, HEADING_EVENT, NONE, sample.std, queues, batch)
     for k in range(len(ranges)):
         sample = ranges[k]
         if _anchor_known(sample, anchors, RANGE_EVENT, batch):
-            _add_event(len(imu), sample, sample.range, RANGE_EVENT, sample.anchor, queues, batch)
+            _add_event(len(imu), sample, sample.range, RANGE_EVENT, sample.anchor, sample.std, queues, batch)
     for k in range(len(bearings)):
         sample = bearings[k]
         if _anchor_known(sample, anchors, BEARING_EVENT, batch):
             value = sample.bearing if sample.std > 0.0 else math.nan
-            _add_event(len(imu), sample, value, BEARING_EVENT, sample.anchor, queues, batch)
+            _add_event(len(imu), sample, value, BEARING_EVENT, sample.anchor, sample.std, queues, batch)
+    for k in range(len(pressures)):
+        sample = pressures[k]
+        value = sample.pressure if sample.pressure > 0.0 else math.nan
+        _add_event(len(imu), sample, value, PRESSURE_EVENT, NONE, sample.temperature, queues, batch)
     due = 0
     for k in range(batch.counts[TOUCHED]):
         start, queue = due, queues[batch.touched[k]]
@@ -142,8 +149,10 @@ def _add_imu(imu: Array, queues: Array, following: Array, times: Array, touched:
 
 
 @njit(nogil=True)
-def _add_event(imu_count: int, sample: Any, value: float, kind: int, anchor: int, queues: Array, batch: Batch) -> None:
-    """Append a heading, range or bearing to its row's list, unless it is not finite or too late."""
+def _add_event(
+    imu_count: int, sample: Any, value: float, kind: int, anchor: int, std: float, queues: Array, batch: Batch
+) -> None:
+    """Append a measurement to its row's list, unless it is not finite or too late."""
     counts = batch.counts
     if not math.isfinite(value):
         _reject(sample.row, NOT_FINITE, kind, batch)
@@ -157,7 +166,7 @@ def _add_event(imu_count: int, sample: Any, value: float, kind: int, anchor: int
     counts[EVENTS] += 1
     event = batch.events[index]
     event.row, event.t_ns, event.kind, event.anchor = sample.row, sample.t_ns, kind, anchor
-    event.value, event.std = value, sample.std
+    event.value, event.std = value, std
     _append_sample(queue, sample.t_ns, imu_count + index, batch.following, batch.times)
 
 

@@ -10,7 +10,7 @@ from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.attitude import ATTITUDE, TILT_SD, level_attitude
 from dropanchor_service.estimation.fleet.frontend.carrying import AUTO, CARRYING, start_carrying
 from dropanchor_service.estimation.fleet.frontend.field import MAGNETOMETER
-from dropanchor_service.estimation.fleet.frontend.preintegration import PREINTEGRATION
+from dropanchor_service.estimation.fleet.frontend.preintegration import G0, PREINTEGRATION
 from dropanchor_service.estimation.fleet.frontend.standstill import BIAS_SD, STANDSTILL, start_standstill
 
 FRONTEND = np.dtype(
@@ -67,7 +67,7 @@ def start_at(f: Frontend, t_ns: int, acc: Array, gyro: Array) -> None:
     a.gyro[:] = gyro
     a.bias[:] = 0.0
     f.bias_end = 0.0
-    a.gravity = 9.80665
+    a.gravity = G0
     start_standstill(s, acc, gyro)
     p.V[:] = 0.0
     p.a[:] = 0.0

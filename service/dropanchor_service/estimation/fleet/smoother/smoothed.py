@@ -1,141 +1,119 @@
-"""Smoothed poses: from all of a recording, or with a fixed lag."""
+"""Smoothed poses, from all of a recording or with a fixed lag. They claim no more than the filtered ones.
 
-import math
+With F the covariance of the filter and S that of the smoother, F - S is what later samples tell, if the models hold.
+Errors that the models leave out last, are in both, and do not shrink. Therefore
+
+- ellipse and state stay those of the filter. Where it had several modes, later samples left one, and not always the
+  right one: the pose moves to that mode and stays `ambiguous`;
+- the mean is that of covariance intersection (Julier and Uhlmann 1997) of equal weights, which holds under any
+  correlation of the two.
+
+The filtered pose stays where nothing `tracking` follows, where S is larger than F, as later samples then tell less than
+earlier ones, and where the two contradict each other.
+"""
+
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from dropanchor_service.estimation.columns import Array, Frame, State, StateReason
-from dropanchor_service.estimation.fleet.belief.heading_models import reference_error
-from dropanchor_service.estimation.fleet.belief.heading_reference import adopt_reference
-from dropanchor_service.estimation.fleet.belief.layout import (
-    DRIFTING,
-    MAGNETOMETER_MODEL,
-    OWN_ERROR,
-    PHI,
-    PLATFORM_MODEL,
-    REFERENCE,
-    YAW,
-    V,
-)
+from dropanchor_service.estimation.columns import Array, Frame, State
 from dropanchor_service.estimation.fleet.belief.summary import add_reference_variance
-from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, RANGE
+from dropanchor_service.estimation.fleet.frontend.node import RANGE
 from dropanchor_service.estimation.fleet.outputs import poses_of
-from dropanchor_service.estimation.fleet.smoother.lag import all_to_planar, smooth_lagged
-from dropanchor_service.estimation.fleet.smoother.lineage import trace_lineage
-from dropanchor_service.estimation.fleet.smoother.smoother import smooth
-from dropanchor_service.estimation.fleet.smoother.trace import TracingEngine
-from dropanchor_service.estimation.fleet.smoother.track import Track, make_track
-from dropanchor_service.estimation.fleet.tuning import Tuning
+from dropanchor_service.estimation.fleet.smoother.lineage import make_followed, smooth_back
+from dropanchor_service.estimation.fleet.smoother.trace import Run, TracingEngine
 
-ITERATIONS = 20
-UNKNOWN_ANGLE = 1.0  # rad, spread of the prior around where a track with unknown start began
-UNKNOWN_SPEED = 2.0  # m/s
-RESOLVED = (State.TRACKING, State.COASTING, State.DEGRADED)
+STRIDE: Final = 0.25  # of the lag: nodes so close together share the end of their data
+WALK_LAG: Final = 3.0  # s of later data at most, of a carried tag: all its hypotheses come from one of before
+CONTRADICTED: Final = 18.4  # chi-square of two degrees of freedom, x and y, exceeded once in 10,000
+WEIGHT: Final = 0.5  # of a smoothed pose beside the filtered one
+LEAST: Final = 1e-12  # m^2 and rad^2, so that no covariance is singular
 
 
-def smoothed_poses(engine: TracingEngine, row: int, lag: float | None) -> Array:
-    """Return the engine's POSE with x, y, heading, speed and covariance smoothed.
+class SmoothedPoses(NamedTuple):
+    """The poses of a track, and which of them are smoothed: the others are as the filter gave them."""
 
-    lag: s of later data that each pose may use; None: all. The belief at the end of that data decides about the mode:
-    where it is resolved, an ambiguous pose becomes `tracking`. What cannot be smoothed stays as the filter gave it.
+    poses: Array  # POSE (n,)
+    used: Array  # bool (n,)
+
+
+def smoothed_poses(engine: TracingEngine, row: int, lag: float | None) -> SmoothedPoses:
+    """Return the engine's POSE, those that are better from later samples with x, y, heading and speed smoothed.
+
+    lag: s of later data that each pose may use; None: all. Of a carried tag that is `WALK_LAG` at most.
     """
-    nodes, beliefs, traces = engine.traced(row)
-    chosen = nodes["kind"] == RANGE
-    poses: Array = poses_of(nodes, beliefs)
-    if not len(poses) or traces["count"][-1] == 0:
-        return poses
-    now = engine.row(row)
-    if lag is None:
-        points, covs = _all(nodes, traces, now, engine.anchors, engine.tuning)
-        seen = np.full(len(nodes), len(nodes) - 1)
-    else:
-        points, covs = _lagged(nodes, traces, now, engine.anchors, engine.tuning, lag)
-        seen = np.searchsorted(nodes["t_ns"], nodes["t_ns"] + round(lag * 1e9) + 1000, side="right") - 1
-    if lag is None:
-        poses["frame"][np.isfinite(points[chosen, 0])] = 1 - now["heading"]["in_site_frame"][0]
-    _put(poses, points[chosen], covs[chosen], beliefs[seen[chosen]], now[0], engine.anchors)
-    return poses
+    run = engine.traced(row)
+    poses: Array = poses_of(run.nodes, run.beliefs)
+    if not len(poses):
+        return SmoothedPoses(poses, np.zeros(0, np.bool_))
+    points, covs = _smooth(engine, run, row, lag)
+    chosen = run.nodes["kind"] == RANGE
+    used = _put(poses, points[chosen], covs[chosen], engine.row(row)[0], engine.anchors)
+    return SmoothedPoses(poses, used)
 
 
-def _lagged(nodes: Array, traces: Array, now: Array, anchors: Array, t: Tuning, lag: float) -> tuple[Array, Array]:
-    """Return points (n, 4): x, y from the anchor, course, speed; and covs (n, 3, 3). NaN where there is no belief."""
-    points, covs = np.empty((len(nodes), 4)), np.empty((len(nodes), 3, 3))
-    most = np.searchsorted(nodes["t_ns"], nodes["t_ns"] + round((lag + 1.0) * 1e9)) - np.arange(len(nodes))
-    smooth_lagged(make_track(int(most.max()) + 1), nodes, traces, lag, now.copy(), anchors, t, points, covs)
+def _smooth(engine: TracingEngine, run: Run, row: int, lag: float | None) -> tuple[Array, Array]:
+    """Return x, y from the anchor, course and speed (n, 4), and covariances (n, 3, 3). NaN: no later one is trusted."""
+    n, now = len(run.nodes), engine.row(row)
+    points, covs = np.full((n, 4), np.nan), np.full((n, 3, 3), np.nan)
+    if now["anchor"][0] < 0:
+        return points, covs
+    anchor = engine.anchors[now["anchor"][0]]
+    published = np.stack([run.beliefs["x"] - anchor["x"], run.beliefs["y"] - anchor["y"]], axis=1)
+    trusted, followed = run.beliefs["state"] == State.TRACKING, make_followed()
+    of_run = followed, run.nodes, run.traces, run.hypotheses, published, trusted
+    for span in _spans(run.nodes["t_ns"], run.traces["carried"], lag):
+        smooth_back(*of_run, span, now, engine.tuning, points, covs)
     return points, covs
 
 
-def _all(nodes: Array, traces: Array, now: Array, anchors: Array, t: Tuning) -> tuple[Array, Array]:
-    """Return what `_lagged` does, from all data since the engine last started."""
-    points, covs = np.full((len(nodes), 4), np.nan), np.full((len(nodes), 3, 3), np.nan)
-    first = int(np.flatnonzero(traces["count"] == 0).max(initial=-1)) + 1
-    nodes, traces = nodes[first:], traces[first:]
-    track = make_track(len(nodes))
-    origin = trace_lineage(nodes, traces, track.reference, track.nlos)
-    heading_class = int(traces["heading_class"][-1, 0])
-    _set_prior(track, traces, max(origin, 0), now[0], _reference_variance(nodes, traces, now[0], heading_class, t))
-    likelihood = smooth(track, nodes, now, anchors, heading_class, t, False, ITERATIONS)
-    if math.isfinite(likelihood):
-        all_to_planar(track.smooth, track.smooth_cov, points[first:], covs[first:])
-    return points, covs
+def _spans(t_ns: Array, carried: Array, lag: float | None) -> list[tuple[int, int, int]]:
+    """Return the first node, the one after the last, and the last node of the data, of nodes that share that data."""
+    spans, a = [], 0
+    changes = np.flatnonzero(np.diff(carried)) + 1
+    for stop in (*changes.tolist(), len(t_ns)):
+        own = min(np.inf if lag is None else lag, WALK_LAG if carried[a] else np.inf)
+        while a < stop:
+            end, b = stop - 1, stop
+            if np.isfinite(own):
+                end = min(int(np.searchsorted(t_ns, t_ns[a] + round(own * 1e9) + 1000, side="right")) - 1, end)
+                b = int(np.searchsorted(t_ns, t_ns[a] + round(STRIDE * own * 1e9), side="right"))
+            spans.append((a, min(b, end + 1), end))
+            a = spans[-1][1]
+    return spans
 
 
-def _reference_variance(nodes: Array, traces: Array, now: Array, heading_class: int, t: Tuning) -> float:
-    """Return the variance, rad^2, of the heading reference's error by the model at the end."""
-    if heading_class == DRIFTING:
-        return 0.0
-    absolute = nodes["heading_var"][nodes["heading_kind"] == ABSOLUTE_HEADING]
-    model = int(now["heading"]["model"])
-    claimed = float(absolute[0]) if model == MAGNETOMETER_MODEL and len(absolute) else 0.0
-    slow = (
-        reference_error(now, claimed)[1]
-        if model != PLATFORM_MODEL
-        else float(traces["cov"][0, 0, REFERENCE, REFERENCE]) ** 0.5
-    )
-    return slow**2 + (t.own_error_std**2 if heading_class == OWN_ERROR and model != PLATFORM_MODEL else 0.0)
-
-
-def _set_prior(track: Track, traces: Array, origin: int, now: Array, reference_variance: float) -> None:
-    """Set the prior to the hypothesis that began the lineage.
-
-    With an unknown start, bearing, speed and yaw are those that were found, with a wide variance. Where yaw counts from
-    a magnetometer later on, it does so from the beginning.
-    """
-    mean, cov, found = traces["mean"][0, origin].copy(), traces["cov"][0, origin].copy(), track.reference[0]
-    if (
-        now["start"]["known"] == 1
-        and now["heading"]["model"] == MAGNETOMETER_MODEL
-        and traces["model"][0] != MAGNETOMETER_MODEL
-    ):
-        adopt_reference(cov, UNKNOWN_ANGLE**2)
-        cov[REFERENCE, :] = cov[:, REFERENCE] = 0.0
-    cov[REFERENCE, REFERENCE] = max(cov[REFERENCE, REFERENCE], reference_variance)
-    if now["start"]["known"] == 0:
-        mean[[PHI, V]] = found[[PHI, V]]
-        if now["heading"]["in_site_frame"] == 1:  # otherwise the course at the start is the x axis
-            mean[YAW] = found[YAW]
-        cov[PHI, PHI] += UNKNOWN_ANGLE**2
-        cov[V, V] += UNKNOWN_SPEED**2
-        if traces["referred"][0] != now["heading"]["in_site_frame"]:
-            cov[YAW, YAW] += UNKNOWN_ANGLE**2
-    for angle in (PHI, YAW):
-        mean[angle] = found[angle] + math.remainder(mean[angle] - found[angle], 2.0 * math.pi)
-    track.mean[0], track.cov[0] = mean, cov
-
-
-def _put(poses: Array, points: Array, covs: Array, seen: Array, now: Array, anchors: Array) -> None:
-    """Put the smoothed numbers into the poses. seen: BELIEF at the end of the data of each."""
-    good = np.isfinite(points).all(axis=1) & np.isfinite(covs).all(axis=(1, 2))
+def _put(poses: Array, points: Array, covs: Array, now: Array, anchors: Array) -> Array:
+    """Put the smoothed numbers into the poses that they are better than, and return which those are."""
+    good = np.isfinite(points).all(axis=1) & np.isfinite(covs).all(axis=(1, 2)) & np.isfinite(poses["x"])
     for k in np.flatnonzero(good & (poses["frame"] == Frame.SITE)):
         if now["start"]["known"] == 0:
             add_reference_variance(covs[k], points[k, 0], points[k, 1], float(now["settings"]["reference_std"]) ** 2)
     anchor = anchors[now["anchor"]]
-    poses["x"][good], poses["y"][good] = points[good, 0] + anchor["x"], points[good, 1] + anchor["y"]
-    poses["heading"][good], poses["speed"][good] = points[good, 2], points[good, 3]
-    poses["cov"][good] = covs[good]
-    poses["sigma_pos"][good] = np.sqrt(covs[good, 0, 0] + covs[good, 1, 1])
-    poses["p_mode"][good] = seen["p_mode"][good]
-    resolved = good & np.isin(seen["state"], RESOLVED) & (poses["state"] == State.AMBIGUOUS)
-    poses["state"][resolved], poses["reason"][resolved] = State.TRACKING, StateReason.RESOLVED
-    unsure = good & (seen["state"] == State.AMBIGUOUS)
-    poses["state"][unsure], poses["reason"][unsure] = State.AMBIGUOUS, StateReason.SEVERAL_MODES
+    points[:, 0] += anchor["x"]
+    points[:, 1] += anchor["y"]
+    filtered = np.stack([poses["x"], poses["y"], poses["heading"]], axis=1)
+    good[good] = _is_allowed(points[good], covs[good], filtered[good], poses["cov"][good])
+    found = _intersect(filtered[good], poses["cov"][good], points[good, :3], covs[good])
+    poses["x"][good], poses["y"][good], poses["heading"][good] = found.T
+    poses["speed"][good] = points[good, 3]
+    return np.asarray(good)
+
+
+def _is_allowed(points: Array, covs: Array, filtered: Array, allowing: Array) -> Array:
+    """Return whether later samples tell more than earlier ones, and do not contradict them."""
+    d, F = points[:, :2] - filtered[:, :2], allowing[:, :2, :2]
+    squared = np.einsum("ni,ni->n", d, np.linalg.solve(F, d[:, :, None])[:, :, 0])
+    return np.asarray((squared < CONTRADICTED) & (np.linalg.det(covs[:, :2, :2]) <= np.linalg.det(F)))
+
+
+def _intersect(filtered: Array, wide: Array, points: Array, covs: Array) -> Array:
+    """Return x, y and course (n, 3), fused with the filtered ones by covariance intersection."""
+    least = LEAST * np.eye(3)
+    later = WEIGHT * np.linalg.inv(covs + least)
+    both = (1.0 - WEIGHT) * np.linalg.inv(wide + least) + later
+    d = points - filtered
+    d[:, 2] = np.remainder(d[:, 2] + np.pi, 2.0 * np.pi) - np.pi
+    found = filtered + np.linalg.solve(both, later @ d[:, :, None])[:, :, 0]
+    found[:, 2] = np.remainder(found[:, 2] + np.pi, 2.0 * np.pi) - np.pi
+    return np.asarray(found)

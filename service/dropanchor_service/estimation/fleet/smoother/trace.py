@@ -1,34 +1,52 @@
-"""What a smoother needs from a run of the engine: its nodes, and the heaviest hypotheses after each of them."""
+"""What the smoother needs from a run of the engine: its nodes, and what the belief was after each of them."""
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.belief.layout import BELIEF, MAX_HYPOTHESES, Anchors, Beliefs, N, Pool, Rows
-from dropanchor_service.estimation.fleet.belief.mixture import sort_by_weight
-from dropanchor_service.estimation.fleet.belief.pool import load, with_room
+from dropanchor_service.estimation.fleet.belief.pool import fitted, load
 from dropanchor_service.estimation.fleet.belief.step import advance
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.fleet.frontend.node import NODE, Nodes
 from dropanchor_service.estimation.fleet.tuning import Tuning, TuningRecord
 
-TRACED: Final = 8  # hypotheses of a node
+CHUNK: Final = 64  # nodes for which there is room at a time
 
 TRACE: Final = np.dtype(
     [
+        ("first", np.int64),  # of its hypotheses
         ("count", np.int32),
-        ("model", np.uint8),  # of the heading error, as in the row
+        ("model", np.uint8),  # of the heading error, as the fields that follow, of the row
+        ("slow_var", np.float64),
         ("referred", np.uint8),
-        ("north", np.float64),
-        ("log_weight", np.float64, (TRACED,)),  # heaviest first
-        ("heading_class", np.int32, (TRACED,)),
-        ("nlos", np.int32, (TRACED,)),
-        ("mean", np.float64, (TRACED, N)),
-        ("cov", np.float64, (TRACED, N, N)),
+        ("rigid", np.uint8),
+        ("carried", np.uint8),
+        ("resolved", np.uint8),
     ]
 )
+
+TRACED: Final = np.dtype(
+    [
+        ("log_weight", np.float64),
+        ("heading_class", np.int32),
+        ("nlos", np.int32),
+        ("aligned", np.int32),
+        ("mean", np.float64, (N,)),
+        ("cov", np.float64, (N, N)),
+    ]
+)
+
+
+class Run(NamedTuple):
+    """The nodes of one row, in order of time, with what the engine made of each."""
+
+    nodes: Array  # NODE
+    beliefs: Array  # BELIEF
+    traces: Array  # TRACE
+    hypotheses: Array  # TRACED
 
 
 class TracingEngine(FleetEngine):
@@ -36,7 +54,8 @@ class TracingEngine(FleetEngine):
 
     def __init__(self, tuning: Tuning | None = None) -> None:
         super().__init__(tuning)
-        self._steps: list[tuple[Array, Array, Array]] = []
+        self._steps: list[Run] = []
+        self._traced = 0
 
     @property
     def tuning(self) -> Tuning:
@@ -51,20 +70,27 @@ class TracingEngine(FleetEngine):
         """Return a copy of ROW (1,) as it is now."""
         return self._rows[row : row + 1].copy()
 
-    def traced(self, row: int) -> tuple[Array, Array, Array]:
-        """Return NODE, BELIEF and TRACE of the row's nodes so far, in order of time."""
-        empty = (np.zeros(0, NODE), np.zeros(0, BELIEF), np.zeros(0, TRACE))
-        nodes, beliefs, traces = (np.concatenate(parts) for parts in zip(empty, *self._steps, strict=True))
+    def traced(self, row: int) -> Run:
+        """Return what was traced of a row so far."""
+        empty = Run(np.zeros(0, NODE), np.zeros(0, BELIEF), np.zeros(0, TRACE), np.zeros(0, TRACED))
+        nodes, beliefs, traces, hypotheses = (np.concatenate(parts) for parts in zip(empty, *self._steps, strict=True))
         own = nodes["row"] == row
-        return nodes[own], beliefs[own], traces[own]
+        return Run(nodes[own], beliefs[own], traces[own], hypotheses)
 
     def _run_belief(self, nodes: Array) -> Array:
+        chunks = [self._trace(nodes[k : k + CHUNK]) for k in range(0, len(nodes), CHUNK)]
+        return np.concatenate([np.zeros(0, BELIEF), *chunks])
+
+    def _trace(self, nodes: Array) -> Array:
         beliefs, traces = np.zeros(len(nodes), BELIEF), np.zeros(len(nodes), TRACE)
-        self._pool = with_room(self._pool, MAX_HYPOTHESES * len(np.unique(nodes["row"])))
-        advance_traced(
-            self._rows, self._pool, nodes, self._anchors, self._tuning_record, self._workspace, beliefs, traces
+        room = np.zeros(len(nodes) * MAX_HYPOTHESES, TRACED)
+        self._pool = fitted(self._pool, self._rows[: self._configured], MAX_HYPOTHESES * len(np.unique(nodes["row"])))
+        used = advance_traced(
+            self._rows, self._pool, nodes, self._anchors, self._tuning_record, self._workspace, beliefs, traces, room
         )
-        self._steps.append((nodes, beliefs, traces))
+        traces["first"] += self._traced
+        self._traced += used
+        self._steps.append(Run(nodes, beliefs, traces, room[:used].copy()))
         return beliefs
 
 
@@ -78,19 +104,23 @@ def advance_traced(
     workspace: Rows,
     beliefs: Beliefs,
     traces: Array,
-) -> None:
-    """Run `advance` one node at a time, and copy the heaviest hypotheses after each."""
+    room: Array,
+) -> int:
+    """Run `advance` one node at a time, and copy the hypotheses after each. Return how many they are."""
     work = workspace[0].hypotheses
+    used = 0
     for k in range(len(nodes)):
         advance(rows, pool, nodes[k : k + 1], anchors, tuning, workspace, beliefs[k : k + 1])
         row, trace = rows[nodes[k].row], traces[k]
-        trace.model, trace.referred, trace.north = row.heading.model, row.heading.in_site_frame, row.heading.north
+        trace.model, trace.slow_var, trace.referred = row.heading.model, row.heading.slow_var, row.heading.in_site_frame
+        trace.rigid, trace.carried, trace.resolved = row.mount.rigid, row.walk.carried, row.publication.resolved
+        trace.first, trace.count = used, row.count
         load(row, pool, work)
-        sort_by_weight(work, row.count)
-        trace.count = min(row.count, TRACED)
-        for j in range(trace.count):
-            h = work[j].by_weight
-            trace.log_weight[j] = work[h].log_weight
-            trace.heading_class[j], trace.nlos[j] = work[h].heading_class, work[h].nlos
-            trace.mean[j] = work[h].mean
-            trace.cov[j] = work[h].cov
+        for h in range(row.count):
+            kept, one = room[used], work[h]
+            kept.log_weight, kept.heading_class = one.log_weight, one.heading_class
+            kept.nlos, kept.aligned = one.nlos, one.aligned
+            kept.mean[:] = one.mean
+            kept.cov[:, :] = one.cov
+            used += 1
+    return used

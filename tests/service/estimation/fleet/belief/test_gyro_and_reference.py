@@ -6,8 +6,8 @@ import pytest
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.belief.heading_reference import adopt_reference
 from dropanchor_service.estimation.fleet.belief.layout import GYRO_BIAS, MOUNT, REFERENCE, YAW, N, R
-from dropanchor_service.estimation.fleet.belief.update import update_standstill
 from dropanchor_service.estimation.fleet.frontend.node import NODE
+from dropanchor_service.estimation.fleet.measurement.rest import update_standstill
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.frontend import new_frontend, run
 from support.imu import Motion

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dropanchor_evaluation.simulated import PriorKnowledge, run_engine
 from dropanchor_service.estimation.fleet.belief.heading_reference import follow_reference
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.evaluation.simulated import PriorKnowledge, run_engine
 from dropanchor_tag_client.simulator.simulation import simulate
 
 

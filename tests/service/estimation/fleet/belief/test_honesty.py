@@ -14,7 +14,7 @@ from dropanchor_service.estimation.fleet.belief.layout import ROW
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.frontend.node import MEASURED_HEADING, RELATIVE_HEADING
-from dropanchor_service.evaluation.accuracy import nees
+from dropanchor_service.offline.accuracy import nees
 from support.fleet_tracks import CALIBRATED, Drive, drive, rows_of, run, track
 
 BURSTS_S = ((3.0, 5.0, 1.5), (12.0, 13.5, 0.8), (20.0, 23.0, 1.2))  # from, to, metres too long
@@ -55,8 +55,16 @@ def misled(seed: int) -> Drive:
 
 def drifting(seed: int) -> Drive:
     """Return a drive with a gyroscope whose bias swings by 0.03 rad/s within a minute."""
-    truth = drive(seed)
+    truth = drive(seed, legs=6)
     truth.nodes["dyaw"] += 0.03 * np.sin(2 * np.pi * truth.nodes["t_ns"] * 1e-9 / 60.0) * truth.nodes["dt_s"]
+    return truth
+
+
+def turning(seed: int) -> Drive:
+    """Return a drive with a heading reference that is right at first, and then turns by 0.3 rad until the end."""
+    truth = drive(seed, legs=6)
+    t = truth.nodes["t_ns"] / truth.nodes["t_ns"][-1]
+    truth.nodes["heading"] += 0.45 * np.clip(t - 1 / 3, 0.0, None)
     return truth
 
 
@@ -97,6 +105,11 @@ def test_the_ranges_distinguish_a_drifting_gyroscope_from_a_drifting_heading() -
     assert np.mean([elsewhere(b, d).mean() for b, d in runs]) < 0.02
 
 
+def test_a_reference_that_turns_after_an_unknown_start_gets_an_error_of_its_own() -> None:
+    runs = [(track(d, known=False), d) for d in map(turning, range(2000, 2012))]
+    assert np.mean([elsewhere(b, d).mean() for b, d in runs]) < 0.05  # measured 0.02; 0.19 without own-error-again
+
+
 def test_while_the_place_is_uncertain_the_ellipse_holds_all_the_places_where_the_tag_may_be() -> None:
     runs = [(track(d, known=False), d) for d in map(drive, range(2000, 2012))]
     ambiguous = [inside(b, d)[20:][b["state"][20:] == State.AMBIGUOUS] for b, d in runs]
@@ -108,15 +121,6 @@ def test_a_tag_that_moves_at_its_first_sample_is_not_declared_in_the_wrong_place
         late = Drive(*(column[100:] for column in truth))
         beliefs = track(late, known=False)
         assert elsewhere(beliefs, late).mean() < 0.02
-
-
-def test_after_a_wrong_turn_of_belief_an_exact_heading_is_tried_again() -> None:
-    """Ranges too long from the very start make a wrong reference look likely; later ranges say that it is right."""
-    runs = []
-    for truth in map(drive, range(2000, 2008)):
-        truth.nodes["z"][:25] += 0.6
-        runs.append((track(truth, known=True), truth))
-    assert np.median([distance(b, d)[-80:].mean() for b, d in runs]) < 0.6
 
 
 def mounted(seed: int, angle: float, heading_kind: int) -> Drive:

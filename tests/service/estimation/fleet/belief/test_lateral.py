@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import default_settings
-from dropanchor_service.estimation.fleet.belief.lateral import (
+from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, GYRO_BIAS, LEFT_BIAS, MOUNT, SLIP, N, V
+from dropanchor_service.estimation.fleet.configure import configure_row
+from dropanchor_service.estimation.fleet.measurement.lateral import (
     is_lateral_known,
     lateral_residual,
     update_lateral,
 )
-from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, GYRO_BIAS, LEFT_BIAS, MOUNT, SLIP, N, V
-from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.belief import STATE, hypothesis_of, jacobian_fd, node_of
 

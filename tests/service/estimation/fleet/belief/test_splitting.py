@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.fleet.belief.layout import PHI, YAW, N, R, V, make_workspace
-from dropanchor_service.estimation.fleet.belief.mixture import angle_variance, curvature, split
+from dropanchor_service.estimation.fleet.belief.births.splitting import curvature, is_curved, is_wide
+from dropanchor_service.estimation.fleet.belief.layout import PHI, ROW, YAW, N, R, V, make_workspace
+from dropanchor_service.estimation.fleet.belief.mixture import angle_variance
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-TUNING = Tuning()
+TUNING = Tuning().record()[0]
 
 
 def travelling(angle: float, speed: float, speed_std: float, angle_std: float = 0.04) -> Any:
@@ -22,15 +23,16 @@ def travelling(angle: float, speed: float, speed_std: float, angle_std: float = 
     return work
 
 
-def parts(work: Any) -> int:
-    return int(split(work, 1, TUNING.split_angle, TUNING.split_curvature, 6.0))
+def is_split(work: Any) -> bool:
+    row = np.zeros(1, ROW)[0]
+    return bool(is_wide(work[0], row, TUNING) or is_curved(work[0], row, TUNING))
 
 
 def test_a_slow_tag_of_uncertain_speed_is_split_where_it_travels_across_the_line_of_sight() -> None:
-    assert parts(travelling(pi / 2, speed=0.4, speed_std=0.3)) == 3
-    assert parts(travelling(0.0, speed=0.4, speed_std=0.3)) == 1
-    assert parts(travelling(pi / 2, speed=0.4, speed_std=0.03)) == 1
-    assert parts(travelling(pi / 2, speed=4.0, speed_std=0.3)) == 1
+    assert is_split(travelling(pi / 2, speed=0.4, speed_std=0.3))
+    assert not is_split(travelling(0.0, speed=0.4, speed_std=0.3))
+    assert not is_split(travelling(pi / 2, speed=0.4, speed_std=0.03))
+    assert not is_split(travelling(pi / 2, speed=4.0, speed_std=0.3))
 
 
 @pytest.mark.parametrize("angle", [pi / 2, -pi / 2])

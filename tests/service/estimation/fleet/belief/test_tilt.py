@@ -79,7 +79,7 @@ def test_the_biases_follow_what_an_arc_and_a_sharp_turn_do_to_the_tilt() -> None
     wrong: list[Any] = []
     predicted: list[Any] = []
     for node in arc_nodes():
-        assert bends_tilt(node)
+        assert bends_tilt(node, True)
         s[[ACC_BIAS, LEFT_BIAS]] *= math.exp(-node.dt_s / Tuning().acc_bias_tau)  # as `predict_state` does
         predict_tilt(s, P, node)
         wrong.append(error_of(node))
@@ -200,6 +200,6 @@ def rotation_by_gyro_bias(after: Any, node: Any) -> Any:
 @pytest.mark.parametrize(("field", "value"), [("carried", 1), ("rest", 1), ("dt_s", 0.0), ("dv_var", math.inf)])
 def test_only_a_vehicle_that_moves_bends_the_tilt(field: str, value: float) -> None:
     node = node_of()
-    assert bends_tilt(node)
+    assert bends_tilt(node, True)
     node[field] = value
-    assert not bends_tilt(node)
+    assert not bends_tilt(node, True)

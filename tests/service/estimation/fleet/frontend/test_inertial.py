@@ -46,8 +46,8 @@ def test_results_do_not_depend_on_how_samples_are_cut_into_batches() -> None:
         high = min(low + 7, len(ends))
         first = 0 if low == 0 else int(np.searchsorted(t, stops[low - 1], side="right"))
         last = len(t) if high == len(ends) else int(np.searchsorted(t, stops[high - 1], side="right"))
-        columns = [np.ascontiguousarray(c[first:last]) for c in (m.acc, m.gyro, m.mag)]
-        drive(cut_rows[0], t[first:last], *columns, stops[low:high], cut[low:high])
+        acc, gyro, mag = (np.ascontiguousarray(c[first:last]) for c in (m.acc, m.gyro, m.mag))
+        drive(cut_rows[0], t[first:last], acc, gyro, mag, stops[low:high], cut[low:high])
     assert cut.tobytes() == whole.tobytes()
     assert flatten(cut_rows).tobytes() == flatten(whole_rows).tobytes()
 

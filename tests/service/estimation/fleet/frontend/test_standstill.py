@@ -18,7 +18,7 @@ from dropanchor_service.estimation.fleet.frontend.standstill import (
 Array = NDArray[Any]
 
 
-@njit
+@njit(cache=True)
 def watch_all(s: Any, dt: float, acc: Array, gyro: Array, bias: Array, rest: Array) -> None:
     start_standstill(s, acc[0], gyro[0])
     for k in range(len(acc)):

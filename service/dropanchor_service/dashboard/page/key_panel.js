@@ -1,0 +1,113 @@
+/** Create, list and revoke keys, for administrators. */
+
+import { send } from "../data/access.js";
+import { api, getJson } from "../data/connection.js";
+import { t, timeText } from "../i18n/language.js";
+import { refusalInForm } from "../i18n/said.js";
+
+/** @typedef {{id: string, name: string, scope: string | null, tag: string | null, expires_ns: number | null}} Key */
+
+export class KeyPanel {
+  /** @param {HTMLElement} box */
+  constructor(box) {
+    this.box = box;
+    this.form = /** @type {HTMLFormElement} */ (box.querySelector("form"));
+    this.form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.#attempt(() => this.#create());
+    });
+    this.#field("may").addEventListener("change", () => this.#askForTag());
+  }
+
+  /** Show the keys. Without the right to see them, or anything to protect, show nothing. */
+  async open() {
+    this.#part("created").hidden = true;
+    this.#part("secret").textContent = "";
+    this.#say("");
+    await this.#refresh();
+  }
+
+  async #refresh() {
+    const { available, keys } = await getJson(api("keys")).catch(() => ({ available: false, keys: [] }));
+    this.box.hidden = !available;
+    this.#part("list").replaceChildren(...keys.map((/** @type {Key} */ key) => this.#line(key)));
+  }
+
+  async #create() {
+    const values = new FormData(this.form);
+    const may = values.get("may");
+    const tag = may === "tag" ? String(values.get("tag")).trim() : null;
+    const body = { name: values.get("name"), days: Number(values.get("days")), tag, scope: tag === null ? may : null };
+    const { secret } = await (await send(api("keys"), "POST", body)).json();
+    this.form.reset();
+    this.#askForTag();
+    this.#say("");
+    this.#part("created-what").textContent = t(tag === null ? "access.created" : "access.created_tag", { tag: tag ?? "" });
+    this.#part("secret").textContent = tag === null ? secret : linkOf(tag, secret);
+    this.#part("created").hidden = false;
+    await this.#refresh();
+    this.#part("created").scrollIntoView({ block: "nearest" });
+  }
+
+  #askForTag() {
+    const isTag = this.#field("may").value === "tag";
+    this.#part("tag").hidden = !isTag;
+    this.#field("tag").disabled = !isTag;
+  }
+
+  /** @param {Key} key */
+  #line({ id, name, scope, tag, expires_ns }) {
+    const line = document.createElement("li");
+    const text = document.createElement("span");
+    const what = tag === null ? t(scope === "write" ? "access.word_write" : "access.word_read") : t("access.word_tag", { tag });
+    text.textContent = lineOf(name, what, expires_ns);
+    const revoke = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: t("share.revoke") });
+    revoke.setAttribute("aria-label", t("share.revoke_one", { what: name }));
+    revoke.addEventListener("click", () => this.#attempt(async () => {
+      await send(api(`keys/${id}`), "DELETE", null);
+      this.#part("created").hidden = true;
+      await this.#refresh();
+    }));
+    line.append(text, revoke);
+    return line;
+  }
+
+  /** @param {() => Promise<void>} act */
+  async #attempt(act) {
+    try {
+      await act();
+    } catch (error) {
+      this.#say(refusalInForm(error));
+    }
+  }
+
+  /** @param {string} problem */
+  #say(problem) {
+    this.#part("problem").textContent = problem;
+    this.#part("problem").hidden = problem === "";
+  }
+
+  /** @param {string} name @returns {HTMLInputElement | HTMLSelectElement} */
+  #field(name) {
+    return /** @type {HTMLInputElement | HTMLSelectElement} */ (this.form.elements.namedItem(name));
+  }
+
+  /** @param {string} name */
+  #part(name) {
+    return /** @type {HTMLElement} */ (this.box.querySelector(`[data-part="${name}"]`));
+  }
+}
+
+/** @param {string} name @param {string} what it allows @param {number | null} expires_ns */
+function lineOf(name, what, expires_ns) {
+  if (expires_ns === null) return t("access.for_ever", { name, what });
+  const time = timeText(expires_ns / 1e6, { dateStyle: "medium" });
+  return t(expires_ns / 1e6 < Date.now() ? "access.expired" : "access.until", { name, what, time });
+}
+
+/** Return the link that makes a phone a tag. Browsers keep what follows the # to themselves, so no log has the key.
+ * @param {string} tag @param {string} secret */
+function linkOf(tag, secret) {
+  const values = new URLSearchParams({ tag, key: secret });
+  return `${new URL("tag/", document.baseURI).href}#${values}`;
+}

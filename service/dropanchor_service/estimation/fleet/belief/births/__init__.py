@@ -1,0 +1,1 @@
+"""Where hypotheses are born or change in kind: the table, the loop that runs it, and a file per family of births."""

@@ -1,0 +1,180 @@
+"""A line of sight that is lost for seconds, and a track that has lost its ranges.
+
+Without line of sight every range is too long by one nearly constant amount. A second hypothesis with a larger range
+bias keeps what such ranges still say. It is born when several ranges in a row are too long, and closed when the bias
+is that of a line of sight again.
+"""
+
+import math
+from typing import Final
+
+from dropanchor_service.estimation.fleet.belief.births.numbers import (
+    RING_AGAIN,
+    SIGHT_CLOSED,
+    SIGHT_EXPECTED,
+    SIGHT_LOST,
+    WIDENED,
+)
+from dropanchor_service.estimation.fleet.belief.births.switches import is_on
+from dropanchor_service.estimation.fleet.belief.layout import (
+    PHI,
+    RANGE_BIAS,
+    Floats,
+    Hypotheses,
+    Hypothesis,
+    N,
+    R,
+    Row,
+    Scratch,
+    V,
+)
+from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis
+from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.node import Node
+from dropanchor_service.estimation.fleet.measurement.scalar import update_component
+from dropanchor_service.estimation.fleet.tuning import Tuning
+
+OFFER_EVERY: Final = 1.0  # s between offers of a line of sight
+MISFIT_LIMIT: Final = 0.5  # mean outlier probability above which most ranges are outliers
+CLOSE_SIGMAS, CLOSE_SLACK = 1.5, 0.2  # standard deviations and m within which a bias is that of a line of sight
+AGREEMENT: Final = 0.2  # mean outlier probability below which the ranges agree with the track
+MAX_WIDENED: Final = 2  # times that a track is widened before it is given up
+WIDEN_POSITION, WIDEN_SPEED = 1.0, 0.5  # m^2 and (m/s)^2 by which a track with a misfit is widened
+
+
+@njit(nogil=True)
+def is_due(kind: int, row: Row, node: Node, t: Tuning) -> bool:
+    """Return whether row and node ask for a change of the line of sight. One that is expected is due once a second."""
+    if kind == SIGHT_EXPECTED:
+        return offers_sight(row, node)
+    return kind == SIGHT_CLOSED or has_jumped(row, t)
+
+
+@njit(nogil=True)
+def admits(kind: int, one: Hypothesis, row: Row, t: Tuning) -> bool:
+    """Return whether the line of sight of a hypothesis changes."""
+    if kind == SIGHT_CLOSED:
+        return has_sight_again(one, t)
+    if kind == SIGHT_LOST:
+        return one.nlos == 1 or are_too_long(row, t)
+    return one.nlos == 1 and (kind == SIGHT_EXPECTED or not are_too_long(row, t))
+
+
+@njit(nogil=True)
+def make(kind: int, work: Hypotheses, source: int, target: int, t: Tuning, scratch: Scratch) -> None:
+    """Copy `source` to `target` for another line of sight, or give it its own again."""
+    if kind == SIGHT_LOST:
+        copy_nlos(work, source, target, t)
+    elif kind == SIGHT_CLOSED:
+        close_sight(work[source], scratch.PH)
+    else:
+        copy_los(work, source, target)
+
+
+@njit(nogil=True)
+def are_too_long(row: Row, t: Tuning) -> bool:
+    """Return whether several ranges in a row were too long: the line of sight is lost, or the path grew longer."""
+    return bool(row.nlos.high_run >= t.nlos_run)
+
+
+@njit(nogil=True)
+def has_jumped(row: Row, t: Tuning) -> bool:
+    """Return whether several ranges in a row were too long or too short: a path grew longer or shorter."""
+    return bool(row.nlos.high_run >= t.nlos_run or row.nlos.low_run >= t.nlos_run)
+
+
+@njit(nogil=True)
+def copy_nlos(work: Hypotheses, source: int, target: int, t: Tuning) -> None:
+    """Copy `source` for a path that is longer than the line of sight by about the mean of an outlier."""
+    copy_hypothesis(work, source, target)
+    new = work[target]
+    if new.nlos == 0:
+        new.los_bias, new.los_bias_var = new.mean[RANGE_BIAS], new.cov[RANGE_BIAS, RANGE_BIAS]
+        new.nlos = 1
+    _decorrelate_bias(new.cov)
+    new.mean[RANGE_BIAS] = new.los_bias + t.outlier_mean
+    new.cov[RANGE_BIAS, RANGE_BIAS] = new.los_bias_var + t.outlier_std**2
+
+
+@njit(nogil=True)
+def copy_los(work: Hypotheses, source: int, target: int) -> None:
+    """Copy `source` for a line of sight that is back, with the range bias from before it was lost."""
+    copy_hypothesis(work, source, target)
+    new = work[target]
+    new.nlos = 0
+    _decorrelate_bias(new.cov)
+    new.mean[RANGE_BIAS] = new.los_bias
+    new.cov[RANGE_BIAS, RANGE_BIAS] = new.los_bias_var
+
+
+@njit(nogil=True)
+def _decorrelate_bias(P: Floats) -> None:
+    for i in range(N):
+        P[RANGE_BIAS, i] = P[i, RANGE_BIAS] = 0.0
+
+
+@njit(nogil=True)
+def offers_sight(row: Row, node: Node) -> bool:
+    """Return whether lost lines of sight may be back now, though no jump shows it."""
+    row.nlos.since_los_offer_s += node.dt_s
+    offer = row.nlos.since_los_offer_s >= OFFER_EVERY
+    if offer:
+        row.nlos.since_los_offer_s = 0.0
+    return bool(offer)
+
+
+@njit(nogil=True)
+def doubt_nlos(work: Hypotheses, count: int, node: Node, t: Tuning) -> None:
+    """Let lost lines of sight come back at the rate 1/nlos_tau."""
+    for h in range(count):
+        if work[h].nlos == 1:
+            work[h].log_weight -= node.dt_s / t.nlos_tau
+
+
+@njit(nogil=True)
+def widen_after_misfit(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> None:
+    """Widen a track whose ranges have been outliers for seconds: the ranges are right and the track is wrong."""
+    nlos = row.nlos
+    nlos.misfit_s = nlos.misfit_s + node.dt_s if nlos.misfit > MISFIT_LIMIT else 0.0
+    if nlos.misfit < AGREEMENT:
+        nlos.widened = 0
+    if nlos.misfit_s < t.misfit_s or not is_on(WIDENED, t):
+        return
+    nlos.misfit_s = 0.0
+    nlos.widened += 1
+    for h in range(count):
+        P = work[h].cov
+        P[R, R] += WIDEN_POSITION
+        P[PHI, PHI] += WIDEN_POSITION / max(work[h].mean[R], 1.0) ** 2
+        P[V, V] += WIDEN_SPEED
+
+
+@njit(nogil=True)
+def contradicts_ranges(work: Hypotheses, count: int, row: Row, t: Tuning) -> bool:
+    """Return whether the track is wrong: ranges stay outliers, or only a long detour would explain them.
+
+    A lost line of sight makes a range longer by a metre or so. A track that has gone wrong needs a larger extra bias
+    as it moves away from the tag, and would take it for the path of the signal for ever.
+    """
+    best = work[best_of(work, count)]
+    extra = best.mean[RANGE_BIAS] - best.los_bias if best.nlos == 1 else 0.0
+    wrong = row.nlos.widened >= MAX_WIDENED or extra > t.nlos_max_bias
+    return bool(wrong and is_on(RING_AGAIN, t))
+
+
+@njit(nogil=True)
+def has_sight_again(one: Hypothesis, t: Tuning) -> bool:
+    """Return whether the extra bias of an NLOS hypothesis has gone."""
+    if one.nlos == 0:
+        return False
+    extra = one.mean[RANGE_BIAS] - one.los_bias
+    sigma = math.sqrt(one.cov[RANGE_BIAS, RANGE_BIAS])
+    certain = extra + 2.0 * sigma < t.nlos_min_bias + CLOSE_SLACK
+    return bool(certain and extra < min(t.nlos_min_bias, CLOSE_SIGMAS * sigma))
+
+
+@njit(nogil=True)
+def close_sight(one: Hypothesis, PH: Floats) -> None:
+    """Give an NLOS hypothesis the bias of its line of sight again."""
+    one.nlos = 0
+    update_component(one.mean, one.cov, PH, RANGE_BIAS, one.los_bias, max(one.los_bias_var, 1e-6))

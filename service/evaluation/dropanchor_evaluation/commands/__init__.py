@@ -1,0 +1,1 @@
+"""`dropanchor evaluate` and its parts. The entry point `evaluate` leads here."""

@@ -1,0 +1,39 @@
+"""Tag settings that the operators of the recordings could have known, and the results of a prototype."""
+
+import math
+
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.offline.plaza import PLAZA_SCALE, PLAZA_STD
+
+TOP_SPEED_MPS = {"iasl": 1.5, "tiers": 0.7, "starloc": 2.5, "mower": 1.0, "plaza": 6.0, "hanyang": 3.0, "inrol": 1.0}
+ARM_M = 0.6
+PROTOTYPE = {
+    "iasl_s1": (0.79, 1.32),
+    "iasl_s3": (0.82, 1.15),
+    "starloc_fast_s1_tag1": (0.86, 2.10),
+    "starloc_fast_s1_tag2": (0.78, 1.58),
+    "mower": (1.20, 1.33),
+    "tiers_B": (1.03, 1.03),
+    "tiers_D": (0.20, 0.20),
+    "plaza2": (6.9, 12.1),
+    "hanyang_losB4": (0.77, 1.32),
+    "hanyang_nlosA2": (0.48, 0.50),
+}
+"""RMSE, m, of the median and the worst anchor: a Gaussian-sum filter with parameters searched on these recordings."""
+
+
+def apply_operator_knowledge(name: str, settings: Array) -> None:
+    """Set what the operator knows in TAG_SETTINGS (0-d). An unknown recording changes nothing."""
+    family = name.split("_")[0].rstrip("0123456789")
+    if family in TOP_SPEED_MPS:
+        settings["speed_max"] = TOP_SPEED_MPS[family]
+    if family == "plaza":
+        settings["range_scale"], settings["range_std"] = PLAZA_SCALE, PLAZA_STD
+    elif family == "hanyang":  # its heading is the direction of travel, made from the truth
+        settings["heading_std"] = settings["slip_std"] = settings["mount_angle"] = settings["mount_angle_std"] = 0.0
+    elif family == "starloc":  # the rig is held out in front with both hands
+        settings["lever_x"] = ARM_M
+    elif family == "inrol":  # carried sideways, by hand
+        settings["mount_angle"], settings["mount_angle_std"], settings["slip_std"] = -math.pi / 2, 0.3, 0.3
+    elif family == "mower":  # the IMU is mounted along its wheels
+        settings["mount_angle"] = 0.0

@@ -1,0 +1,94 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+const { Choice, MOST_SELECTED } = await import("../../../service/dropanchor_service/dashboard/page/choice.js");
+const { listIn, listText } = await import("../../../service/dropanchor_service/dashboard/data/address.js");
+const { joinedCsv, joinedGeojson } = await import("../../../service/dropanchor_service/dashboard/data/joined_tracks.js");
+const { latLonOfSite, siteOfLatLon } = await import("../../../service/dropanchor_service/dashboard/plan/geodesy.js");
+
+const toggle = (choice, tag) => choice.selectAll(choice.toggled(tag), choice.gathering);
+
+test("one selected tag is no group of tags, however it was selected", () => {
+  const choice = new Choice();
+  choice.select("a");
+  toggle(choice, "b");
+  assert.deepEqual([choice.selected, choice.several], [null, ["a", "b"]]);
+  toggle(choice, "a");
+  assert.deepEqual([choice.selected, choice.several], ["b", []]);
+  toggle(choice, "b");
+  assert.deepEqual([choice.selected, choice.tags], [null, []]);
+});
+
+test("while tags are gathered even one is a group, until the last is taken out", () => {
+  const choice = new Choice();
+  choice.selectAll(["a"], true);
+  assert.deepEqual([choice.selected, choice.several], [null, ["a"]]);
+  toggle(choice, "b");
+  toggle(choice, "a");
+  assert.deepEqual(choice.several, ["b"]);
+  toggle(choice, "b");
+  assert.equal(choice.gathering, false);
+});
+
+test("following ends with the selection, and not with a change of it", () => {
+  const choice = new Choice();
+  choice.selectAll(["a", "b", "a"]);
+  assert.deepEqual(choice.tags, ["a", "b"]);
+  choice.follow = true;
+  toggle(choice, "c");
+  assert.equal(choice.follow, true);
+  choice.select(null);
+  assert.equal(choice.follow, false);
+});
+
+test("the same selection again is no change, and a very large one is cut", () => {
+  const choice = new Choice();
+  let changes = 0;
+  choice.addEventListener("change", () => changes++);
+  choice.selectAll(Array.from({ length: MOST_SELECTED + 5 }, (_, i) => `tag-${i}`));
+  choice.selectAll([...choice.tags]);
+  toggle(choice, "one more");
+  assert.equal(choice.tags.length, MOST_SELECTED);
+  assert.equal(changes, 1);
+});
+
+test("names with commas, signs and spaces stay whole in the list of the address", () => {
+  const names = ["a,b", "100 %", "süd & co", "cart-1"];
+  const values = new URLSearchParams(new URLSearchParams({ tags: listText(names) }).toString());
+  assert.deepEqual(listIn(values.get("tags") ?? ""), names);
+  assert.deepEqual(listIn("a,%zz,,b"), ["a", "%zz", "b"]);
+});
+
+test("joined tracks name the tag of each pose, and have one head", () => {
+  const parts = [{ tag: "a", text: "t_ns,x\r\n1,2\r\n3,4\r\n" }, { tag: "b,c", text: "t_ns,x\r\n5,6\r\n" }, { tag: "none", text: "" }];
+  assert.equal(joinedCsv(parts), 'tag,t_ns,x\r\na,1,2\r\na,3,4\r\n"b,c",5,6\r\n');
+  const text = JSON.stringify({ type: "FeatureCollection", features: [{ type: "Feature", geometry: null, properties: { x: 1 } }] });
+  const { features } = JSON.parse(joinedGeojson([{ tag: "a", text }, { tag: "b", text }]));
+  assert.deepEqual(features.map((/** @type {any} */ { properties }) => properties), [{ tag: "a", x: 1 }, { tag: "b", x: 1 }]);
+});
+
+test("latitude and longitude of a place lead back to it", () => {
+  const origin = { lat: 52.5, lon: 13.4, rotation_rad: 0.7 };
+  for (const [x, y] of [[0, 0], [30, -12], [-4000, 2500]]) {
+    const [back_x, back_y] = siteOfLatLon(origin, latLonOfSite(origin, x, y));
+    assert.ok(Math.hypot(back_x - x, back_y - y) < 1e-4, `${back_x}, ${back_y}`);
+  }
+});
+
+test("what is typed into the settings of a tag stays when something else of them is saved", async () => {
+  const { fillForm, patchOf, typedIn } = await import("../../../service/dropanchor_service/dashboard/setup/tag_form.js");
+  globalThis.Option = class {};
+  const fields = Object.fromEntries(["name", "group", "colour", "motion", "mount", "height"].map((name) => [name, { value: "", dataset: { measure: "length" }, replaceChildren() {}, valueAsNumber: NaN }]));
+  const form = { elements: { namedItem: (name) => fields[name] }, querySelector: () => null };
+  const settings = { name: "", group: "", colour: null, motion: "cart", mount_angle_rad: null, height_m: 0 };
+  fillForm(form, settings, new Set());
+  fields.name.value = "Cart 7";
+  const typeAgain = typedIn(form);
+  fillForm(form, { ...settings, group: "carts" }, new Set());
+  typeAgain();
+  assert.deepEqual(patchOf(form), { name: "Cart 7" });
+  assert.equal(fields.group.value, "carts");
+  Object.assign(fields.height, { value: "1.5", valueAsNumber: 1.5 });
+  fillForm(form, { ...settings, name: "Cart 7", height_m: 1.5 }, new Set()); // as saved
+  assert.deepEqual(patchOf(form), {});
+});

@@ -1,0 +1,39 @@
+"""`make check` compares the page's modules with the types in their comments."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from support import page_types
+
+RIGHT = "/** @param {number} side */\nexport const area = (side) => side * side;\n"
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A project of one module with the options of the page's own."""
+    problem = page_types.problem_of_compiler(page_types.FOLDER)
+    if problem is not None:
+        pytest.skip(problem)
+    path = tmp_path / "tsconfig.json"
+    path.write_text(json.dumps({"extends": str(page_types.PROJECT), "include": ["*.js"]}))
+    return path
+
+
+@pytest.mark.parametrize("wrong", ['area("2");', "export const half = (side) => side / 2;"])
+def test_a_module_with_a_wrong_or_missing_type_is_named(project: Path, wrong: str) -> None:
+    module = project.parent / "area.js"
+    module.write_text(RIGHT)
+    assert page_types.errors_in(project, page_types.FOLDER) == ""
+    module.write_text(f"{RIGHT}{wrong}\n")
+    assert "area.js(3," in page_types.errors_in(project, page_types.FOLDER)
+
+
+def test_without_npm_and_node_the_check_says_so_and_passes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(page_types, "FOLDER", tmp_path / "typescript")
+    assert page_types.main() == 0
+    assert "npm and node are not installed" in capsys.readouterr().err
