@@ -89,4 +89,4 @@ def test_motion_from_the_future_is_aligned_with_the_ranges_of_its_tag(service: R
     assert status["clock_offset"]["corrected"]
     assert status["clock_offset"]["offset_s"] == pytest.approx(3.1, abs=0.3)
     assert [care["reason"] for care in status["needs_care"]] == ["clock_offset"]
-    assert status["rejected"] == {}
+    assert set(status["rejected"]) <= {"duplicate"}  # a message that was late, and fetched meanwhile, comes twice
