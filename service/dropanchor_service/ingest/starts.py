@@ -53,10 +53,13 @@ class StartWatch:
         self._count = 0  # of open ones
 
     def tell(self, row: int, tag: TagSettings, earlier: TagSettings | None) -> None:
-        """Follow a row that starts again with these settings. earlier: those before."""
+        """Follow a row that starts again with these settings. earlier: those before.
+
+        Events may hang on a start that an earlier process followed: so a first row tells that it has none.
+        """
         self._set(row, tag.start is not None)
         place, before = _place(tag), "" if earlier is None else _place(earlier)
-        if self._engine is not None and (place or before):
+        if self._engine is not None and (place or before or earlier is None):
             self._news.append(StartNews(row, StartPhase.TOLD, place, before))
 
     def resume(self, row: int, tag: TagSettings) -> None:

@@ -100,3 +100,9 @@ def test_a_start_that_the_engine_no_longer_follows_after_a_restart_is_at_an_end(
     for row in (0, 1):
         watch.resume(row, settings)
     assert [(one.row, one.phase) for one in news.take()] == [(0, StartPhase.RESUMED), (1, StartPhase.ENDED)]
+
+
+def test_a_row_that_an_earlier_process_had_tells_that_its_settings_have_no_start_now() -> None:
+    news = StartNewsQueue()
+    StartWatch(FleetEngine(), news).tell(0, TagSettings(), None)
+    assert [(one.phase, one.place) for one in news.take()] == [(StartPhase.TOLD, "")]
