@@ -3,6 +3,7 @@
 from dropanchor_service.engines.warm_up import CompilationProgress, warm_up
 from dropanchor_service.estimation.columns import Engine
 from dropanchor_service.runtime.kernel_cache import use_kernel_cache
+from dropanchor_service.runtime.processors import usable_processors
 from dropanchor_service.settings.model import Settings
 
 
@@ -18,4 +19,11 @@ def create_engine(settings: Settings, progress: CompilationProgress | None = Non
             from dropanchor_service.estimation.fleet.engine import FleetEngine
 
             warm_up(FleetEngine(), progress)
-            return FleetEngine(max_lag_s=settings.ingest.max_lag_s)
+            return FleetEngine(max_lag_s=settings.ingest.max_lag_s, threads=threads_of(settings))
+
+
+def threads_of(settings: Settings) -> int:
+    """Return how many threads share the tags."""
+    if settings.engine_threads == "auto":
+        return max(int(usable_processors()), 1)
+    return settings.engine_threads

@@ -151,6 +151,11 @@ class Settings(_Section):
     engine: Literal["fleet", "paper"] = Field(
         default="fleet", description="The estimator: the default, or Algorithm 1 as published."
     )
+    engine_threads: Annotated[int, Field(ge=1, le=256)] | Literal["auto"] = Field(
+        default="auto",
+        description="Threads that share the tags. auto: one for each processor that the process may use, by its "
+        "affinity and the quota of its control group. The poses are the same to the last bit. `paper` has one thread.",
+    )
     data_dir: Path | None = Field(
         default=None,
         description="Folder for changes made over REST, history, recordings and checkpoints. Without it, a restart "

@@ -1,22 +1,28 @@
 """The engine `fleet`: one row of front-end and pose belief per tag, and a pool of hypotheses for all of them."""
 
+from functools import partial
+from typing import NamedTuple
+
 import numpy as np
 
 from dropanchor_service.estimation.columns import ANCHOR, Array, PoseBatch, SampleBatch
 from dropanchor_service.estimation.fleet.belief.layout import BELIEF, MAX_HYPOTHESES, ROW, make_workspace
-from dropanchor_service.estimation.fleet.belief.pool import fitted, make_pool, release
+from dropanchor_service.estimation.fleet.belief.pool import fitted, make_pool, of_lanes, release
 from dropanchor_service.estimation.fleet.belief.step import advance
 from dropanchor_service.estimation.fleet.configure import HEIGHT_STD, configure_row
 from dropanchor_service.estimation.fleet.frontend.assembly import assemble_nodes
 from dropanchor_service.estimation.fleet.frontend.batching import MAX_LAG_S
-from dropanchor_service.estimation.fleet.frontend.height import HEIGHT, start_height
+from dropanchor_service.estimation.fleet.frontend.height import HEIGHT, share_references, start_height
 from dropanchor_service.estimation.fleet.frontend.node import NODE
-from dropanchor_service.estimation.fleet.frontend.ordering import SampleQueue
+from dropanchor_service.estimation.fleet.frontend.ordering import Due, SampleQueue
 from dropanchor_service.estimation.fleet.frontend.platform import PLATFORM
 from dropanchor_service.estimation.fleet.frontend.state import FRONTEND, start_frontend
+from dropanchor_service.estimation.fleet.lanes import Lanes
 from dropanchor_service.estimation.fleet.outputs import (
+    Part,
     doubted_of,
     innovations_of,
+    joined,
     modes_of,
     poses_of,
     skipped_of,
@@ -30,17 +36,26 @@ HARD_IRON, HARD_IRON_CALIBRATED = 1.0, 0.05  # prior sd of a magnetometer's hard
 _BY_ROW = ("rows", "fronts", "platforms", "heights")
 
 
+class _Run(NamedTuple):
+    """What a part of a batch became: NODE, BELIEF of each, and how many at the end have none yet."""
+
+    nodes: Array
+    beliefs: Array
+    left: int
+
+
 class FleetEngine:
     """Implement `Engine`, `Restorable`, `DeniesStarts` and `FollowsPressure`.
 
     A checkpoint copies the rows, the pool and the pending samples.
 
-    max_lag_s: how long the measurements of a row wait at most for IMU samples that come in batches.
+    max_lag_s: how long the measurements of a row wait at most for IMU samples that come in batches. threads: how many
+    share the rows of a batch; the poses are the same, to the last bit.
     """
 
     name = "fleet"
 
-    def __init__(self, tuning: Tuning | None = None, max_lag_s: float = MAX_LAG_S) -> None:
+    def __init__(self, tuning: Tuning | None = None, max_lag_s: float = MAX_LAG_S, threads: int = 1) -> None:
         self._tuning = tuning or Tuning()
         self._tuning_record = self._tuning.record()
         self._anchors = np.zeros(0, ANCHOR)
@@ -49,8 +64,10 @@ class FleetEngine:
         self._fronts = np.zeros(0, FRONTEND)
         self._platforms = np.zeros(0, PLATFORM)
         self._heights = np.zeros(0, HEIGHT)
-        self._pool = make_pool(MAX_HYPOTHESES * 2)
-        self._workspace = make_workspace()
+        self._lanes = Lanes(threads)
+        self._pool = make_pool(MAX_HYPOTHESES * 2 * threads, threads)
+        self._workspaces = [make_workspace(lane) for lane in range(threads)]
+        self._referring: dict[int, None] = {}  # rows whose pressures count from another row
         self._queue = SampleQueue(max_lag_s)
 
     def set_anchors(self, anchors: Array) -> None:
@@ -60,7 +77,7 @@ class FleetEngine:
     def configure(self, row: int, settings: Array) -> None:
         """Make `row` with these TAG_SETTINGS (0-d), or start it again with new ones."""
         self._reserve_rows(row + 1)
-        release(self._rows[row], self._pool)
+        release(self._rows[row], self._pool, 0)
         self._rows[row] = configure_row(settings, self._tuning)
         hard_iron = HARD_IRON_CALIBRATED if settings["magnetometer_calibrated"] else HARD_IRON
         start_frontend(self._fronts[row], hard_iron, float(settings["declination"]), int(settings["motion"]))
@@ -76,21 +93,50 @@ class FleetEngine:
         due = self._queue.due(samples, len(self._anchors))
         if not len(due.order):
             return PoseBatch(rejected=due.rejected, unused=due.unused, lags=due.lags)
-        nodes, verdicts = np.zeros(len(due.order), NODE), np.zeros(len(samples.imu), np.uint8)
-        rows = (self._fronts, self._platforms, self._rows, self._heights)
-        nodes = nodes[: assemble_nodes(samples.imu, due.events, due.order, *rows, nodes, verdicts)]
-        beliefs = self._run_belief(nodes)
-        skipped, stuck = skipped_of(samples.imu, verdicts), stuck_ranges_of(nodes, beliefs)
+        if self._referring:
+            share_references(self._heights, np.fromiter(self._referring, np.int64))
+        self._pool = fitted(self._pool, self._rows[: self._configured], MAX_HYPOTHESES, self._lanes.count)
+        verdicts = np.zeros(len(samples.imu), np.uint8)
+        cuts = self._lanes.cut(due.order, samples.imu["row"], due.events["row"])
+        parts = self._lanes.run([partial(self._advance, samples.imu, due, verdicts, cut) for cut in cuts])
+        for nodes, beliefs, left in parts:
+            self._run_rest(nodes, beliefs, left)
+        found = joined(self._lanes.run([partial(self._outputs, part.nodes, part.beliefs) for part in parts]))
+        skipped, stuck = skipped_of(samples.imu, verdicts), found.stuck
         doubted = doubted_of(due.events, due.order, len(samples.imu))
         unused = with_rows(with_rows(due.unused, "imu", skipped), "range", stuck)
         return PoseBatch(
-            poses_of(nodes, beliefs),
-            modes_of(nodes, beliefs, self._rows, self._pool, self._anchors, self._workspace),
-            innovations_of(nodes, beliefs),
+            found.poses,
+            found.modes,
+            found.innovations,
             due.rejected | skipped | stuck | doubted,
             with_rows(unused, "pressure", doubted),
             due.lags,
         )
+
+    def _advance(self, imu: Array, due: Due, verdicts: Array, cut: slice, lane: int) -> _Run:
+        """Turn a part of the samples into nodes, and run the belief over them."""
+        order = due.order[cut]
+        nodes = np.zeros(len(order), NODE)
+        rows = (self._fronts, self._platforms, self._rows, self._heights)
+        nodes = nodes[: assemble_nodes(imu, due.events, order, *rows, nodes, verdicts)]
+        beliefs = np.zeros(len(nodes), BELIEF)
+        return _Run(nodes, beliefs, self._run_belief(nodes, beliefs, lane))
+
+    def _run_belief(self, nodes: Array, beliefs: Array, lane: int) -> int:
+        """Run the belief over the nodes. Return how many are left because the pool has no room."""
+        workspace = self._workspaces[lane]
+        return int(advance(self._rows, self._pool, nodes, self._anchors, self._tuning_record, workspace, beliefs))
+
+    def _run_rest(self, nodes: Array, beliefs: Array, left: int) -> None:
+        """Run the belief over the last nodes of a part for which the pool had no room."""
+        while left > 0:
+            self._pool = fitted(self._pool, self._rows[: self._configured], MAX_HYPOTHESES, self._lanes.count)
+            left = self._run_belief(nodes[-left:], beliefs[-left:], 0)
+
+    def _outputs(self, nodes: Array, beliefs: Array, lane: int) -> Part:
+        modes = modes_of(nodes, beliefs, self._rows, self._pool, self._anchors, self._workspaces[lane])
+        return Part(poses_of(nodes, beliefs), modes, innovations_of(nodes, beliefs), stuck_ranges_of(nodes, beliefs))
 
     def _reserve_rows(self, rows: int) -> None:
         """Make room for this many rows: at least twice as many as before, if there is not enough."""
@@ -103,19 +149,13 @@ class FleetEngine:
             room[: len(before)] = before
             setattr(self, f"_{name}", room)
 
-    def _run_belief(self, nodes: Array) -> Array:
-        """Run the belief over the nodes. Return BELIEF, one per node."""
-        beliefs = np.zeros(len(nodes), BELIEF)
-        left = len(nodes)
-        while left > 0:
-            self._pool = fitted(self._pool, self._rows[: self._configured], MAX_HYPOTHESES)
-            rest, found = nodes[-left:], beliefs[-left:]
-            left = advance(self._rows, self._pool, rest, self._anchors, self._tuning_record, self._workspace, found)
-        return beliefs
-
     def refer(self, row: int, reference: int) -> None:
         """Compare the pressures of `row` with those of the row `reference`, -1: none. Its estimate goes on."""
         height = self._heights[row]
+        if reference < 0:
+            self._referring.pop(row, None)
+        else:
+            self._referring[row] = None
         if height["reference"] != reference:
             height["reference"], height["referred"] = reference, 0
 
@@ -134,4 +174,6 @@ class FleetEngine:
         for name in (*_BY_ROW, "pool"):
             setattr(self, f"_{name}", state[name])
         self._configured = len(self._rows)
+        self._pool = of_lanes(self._pool, self._rows, self._lanes.count)
+        self._referring = dict.fromkeys(np.flatnonzero(self._heights["reference"] >= 0).tolist())
         self._queue.restore(state)

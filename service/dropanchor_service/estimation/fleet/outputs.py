@@ -1,6 +1,7 @@
 """The output of the engine: poses, innovations and modes from nodes and beliefs, in compiled code."""
 
-from typing import Final
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,29 @@ MODES: Final = 8  # at most, of a pose
 REJECTED_ABOVE: Final = 0.5  # outlier probability above which a measurement hardly moved the belief
 SKIPPED: Final = {REPEATED: "time_repeated", STUCK: "imu_stuck"}
 OF_RANGE, OF_BEARING = int(MeasurementKind.RANGE), int(MeasurementKind.BEARING)
+
+
+class Part(NamedTuple):
+    """The output of some rows: POSE, HYPOTHESIS, INNOVATION, and the rows of stuck ranges under their reason."""
+
+    poses: Array
+    modes: Array
+    innovations: Array
+    stuck: dict[str, Array]
+
+
+def joined(parts: Sequence[Part]) -> Part:
+    """Return the output of all rows."""
+    if len(parts) == 1:
+        return parts[0]
+    poses, modes, innovations = (_concatenated(columns) for columns in list(zip(*parts, strict=True))[:3])
+    stuck = [rows for part in parts for rows in part.stuck.values()]
+    return Part(poses, modes, innovations, {"range_stuck": np.concatenate(stuck)} if stuck else {})
+
+
+def _concatenated(columns: Sequence[Array]) -> Array:
+    raw = np.dtype((np.void, columns[0].itemsize))  # NumPy copies records field by field
+    return np.concatenate([column.view(raw) for column in columns]).view(columns[0].dtype)
 
 
 def poses_of(nodes: Array, beliefs: Array) -> Array:

@@ -85,6 +85,7 @@ START: Final = np.dtype(
         ("range_count", np.int32),
         ("ranges", np.float64, (START_RANGES,)),  # m, the last ones as distances
         ("collected_s", np.float64),  # s over which they were collected
+        ("way", np.float64),  # m, driven since the start
     ]
 )
 
@@ -224,7 +225,7 @@ POOL_SLOT: Final = np.dtype(
         ("nlos", np.int32),  # 1: there is no line of sight now, so ranges are too long
         ("reverse", np.int32),  # 1: the tag moves backwards since it last stood
         ("aligned", np.int32),  # 1: the body axis is taken to point along the course
-        ("free", np.int32),  # in slot 0: how many slots are free
+        ("free", np.int32),  # in the head of a free list: how many slots it has
         ("log_weight", np.float64),
         ("los_bias", np.float64),  # m, range bias before the line of sight was lost
         ("los_bias_var", np.float64),  # m^2
@@ -295,6 +296,7 @@ SCRATCH: Final = np.dtype(
         ("part", np.float64, (3, 3)),
         ("share", np.float64, (FAMILIES,)),
         ("point", np.float64, (3,)),
+        ("lane", np.int64),  # whose free slots of the pool the thread takes
     ]
 )
 
@@ -317,6 +319,8 @@ Beliefs: TypeAlias = npt.NDArray[np.void]  # BELIEF (n,)
 Anchors: TypeAlias = npt.NDArray[np.void]  # ANCHOR (n,)
 
 
-def make_workspace() -> npt.NDArray[np.void]:
+def make_workspace(lane: int = 0) -> npt.NDArray[np.void]:
     """Return WORKSPACE (1,): for one thread, with room for the unpacked hypotheses of one row."""
-    return np.zeros(1, WORKSPACE)
+    workspace = np.zeros(1, WORKSPACE)
+    workspace["scratch"]["lane"] = lane
+    return workspace

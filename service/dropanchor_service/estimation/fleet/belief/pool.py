@@ -1,6 +1,7 @@
 """One pool of hypothesis slots for all rows.
 
-The slots of a row are a linked list. `load` unpacks them into the workspace and `store` packs them back.
+The slots of a row are a linked list. `load` unpacks them into the workspace and `store` packs them back. Each lane has
+a list of free slots of its own, so that several threads can work on different rows of one pool.
 """
 
 import numpy as np
@@ -19,34 +20,53 @@ from dropanchor_service.estimation.fleet.belief.layout import (
 from dropanchor_service.estimation.fleet.compiled import njit
 
 
-def make_pool(capacity: int) -> Pool:
-    """Return `capacity` slots in one free list. Slot 0 is the head of that list and holds no hypothesis."""
+def make_pool(capacity: int, lanes: int = 1) -> Pool:
+    """Return `capacity` slots. Slot k is the head of the free list of lane k, and holds no hypothesis."""
     pool = np.zeros(capacity, POOL_SLOT)
-    pool["next"] = np.arange(1, capacity + 1)
-    pool["next"][-1] = -1
-    pool["free"][0] = capacity - 1
+    _deal(pool, lanes, lanes)
     return pool
 
 
-def fitted(pool: Pool, rows: Rows, slots: int) -> Pool:
-    """Return the pool, or one of a better size with the same hypotheses: with `slots` free slots, and few more.
+def _deal(pool: Pool, first: int, lanes: int) -> None:
+    """Deal the slots from `first` on out to the free lists."""
+    ends = first + (len(pool) - first) * np.arange(1, lanes + 1) // lanes
+    pool["next"][first:] = np.arange(first + 1, len(pool) + 1)
+    for lane, end in enumerate(ends.tolist()):
+        pool["next"][lane], pool["free"][lane] = (first, end - first) if end > first else (-1, 0)
+        pool["next"][end - 1 if end > first else lane] = -1
+        first = end
 
-    rows: all that have hypotheses. In another pool those of each row lie one behind the other, which is fast to read.
+
+def fitted(pool: Pool, rows: Rows, slots: int, lanes: int = 1) -> Pool:
+    """Return the pool, or one of a better size with the same hypotheses: with `slots` free ones in each lane, or more.
+
+    rows: all that have hypotheses.
     """
-    free = int(pool["free"][0])
-    used = len(pool) - 1 - free
-    if slots <= free <= 2 * slots + used:
-        return pool
-    moved = make_pool(1 + used + slots + used // 4)
+    free = pool["free"][:lanes]
+    total = int(free.sum())
+    enough = int(free.min()) >= slots and total <= 2 * slots * lanes + len(pool) - lanes - total
+    return pool if enough else packed(pool, rows, slots, lanes)
+
+
+def of_lanes(pool: Pool, rows: Rows, lanes: int) -> Pool:
+    """Return a pool from a checkpoint, or one with the same hypotheses if it was one of another number of lanes."""
+    slots = lanes + int(rows["count"].sum()) + int(pool["free"][:lanes].sum())
+    return pool if slots == len(pool) else packed(pool, rows, MAX_HYPOTHESES, lanes)
+
+
+def packed(pool: Pool, rows: Rows, slots: int, lanes: int = 1) -> Pool:
+    """Return another pool with the same hypotheses: those of each row one behind the other, which is fast to read."""
     at = _slots_of(rows, pool)
+    used = len(at)
+    moved = np.zeros(lanes + used + slots * lanes + used // 4, POOL_SLOT)
     raw = np.dtype((np.void, POOL_SLOT.itemsize))  # NumPy copies records field by field
-    moved.view(raw)[1 : used + 1] = pool.view(raw)[at]
-    moved["next"][1 : used + 1] = np.arange(2, used + 2)
-    moved["next"][0], moved["free"][0] = used + 1, len(moved) - 1 - used
+    moved.view(raw)[lanes : lanes + used] = pool.view(raw)[at]
+    moved["next"][lanes : lanes + used] = np.arange(lanes + 1, lanes + used + 1)
+    _deal(moved, lanes + used, lanes)
     ends = np.cumsum(rows["count"])
     filled = rows["count"] > 0
-    moved["next"][ends[filled]] = -1
-    rows["first_slot"][filled] = (ends - rows["count"] + 1)[filled]
+    moved["next"][ends[filled] + lanes - 1] = -1
+    rows["first_slot"][filled] = (ends - rows["count"] + lanes)[filled]
     return moved
 
 
@@ -86,9 +106,9 @@ def load(row: Row, pool: Pool, work: Hypotheses) -> None:
 
 
 @njit(nogil=True)
-def store(row: Row, pool: Pool, work: Hypotheses, count: int) -> None:
-    """Pack up to MAX_HYPOTHESES of `work` into the row's slots. Take or return slots as needed."""
-    _resize(row, pool, min(count, MAX_HYPOTHESES))
+def store(row: Row, pool: Pool, work: Hypotheses, count: int, lane: int) -> None:
+    """Pack up to MAX_HYPOTHESES of `work` into the row's slots. Take or return slots of the lane as needed."""
+    _resize(row, pool, min(count, MAX_HYPOTHESES), lane)
     slot = row.first_slot
     for h in range(row.count):
         stored = pool[slot]
@@ -117,24 +137,24 @@ def mirror(P: Floats) -> None:
 
 
 @njit(nogil=True, cache=True)
-def release(row: Row, pool: Pool) -> None:
-    """Return all slots of the row."""
-    _resize(row, pool, 0)
+def release(row: Row, pool: Pool, lane: int) -> None:
+    """Return all slots of the row to the lane."""
+    _resize(row, pool, 0, lane)
 
 
 @njit(nogil=True)
-def _resize(row: Row, pool: Pool, count: int) -> None:
+def _resize(row: Row, pool: Pool, count: int, lane: int) -> None:
     while row.count > count:
         slot = row.first_slot
         row.first_slot = pool[slot].next
-        pool[slot].next = pool[0].next
-        pool[0].next = slot
-        pool[0].free += 1
+        pool[slot].next = pool[lane].next
+        pool[lane].next = slot
+        pool[lane].free += 1
         row.count -= 1
     while row.count < count:
-        slot = pool[0].next
-        pool[0].next = pool[slot].next
-        pool[0].free -= 1
+        slot = pool[lane].next
+        pool[lane].next = pool[slot].next
+        pool[lane].free -= 1
         pool[slot].next = row.first_slot
         row.first_slot = slot
         row.count += 1

@@ -160,11 +160,11 @@ def _run_node(
 
 
 @njit(nogil=True)
-def _reset_after_fault(row: Row, pool: Pool) -> None:
+def _reset_after_fault(row: Row, pool: Pool, lane: int) -> None:
     """Start a row again whose numbers were not finite. It is no longer where it started."""
     row.faults += 1
     row.publication.reason = FAULT
-    release(row, pool)
+    release(row, pool, lane)
     forget(row, PLACE | GAP | TRACK | NOISE)
 
 
@@ -183,7 +183,7 @@ def _follow(
     """Take a node into a row that has hypotheses, which start again where they are wrong. Return their count."""
     count = _run_node(work, count, row, node, anchors, t, scratch, belief)
     if count == 0:
-        _reset_after_fault(row, pool)
+        _reset_after_fault(row, pool, scratch.lane)
     elif node.kind == RANGE and node.anchor == row.anchor and contradicts_ranges(work, count, row, t):
         return restart_on_ring(work, count, row, node, anchors[row.anchor], t)
     return count
@@ -215,7 +215,7 @@ def _advance_row(
     if count > 0:
         accumulate_gap(work, count, row, node)
     if count > 0 and (is_track_lost(row, node) or was_walked_off(row, node, t)):
-        release(row, pool)
+        release(row, pool, scratch.lane)
         forget(row, TRACK)
         count = 0
     if count > 0:
@@ -229,7 +229,7 @@ def advance(
 ) -> int:
     """Run the nodes and write one belief per node. The nodes of one row are in order of time.
 
-    Return how many nodes are left because the pool has no room for another row.
+    Return how many nodes are left because the lane of the workspace has no room for another row.
     """
     work, scratch, t = workspace[0].hypotheses, workspace[0].scratch, tuning[0]
     current = -1
@@ -238,9 +238,9 @@ def advance(
         node = nodes[k]
         if node.row != current:
             if current >= 0:
-                store(rows[current], pool, work, count)
+                store(rows[current], pool, work, count, scratch.lane)
             current = node.row
-            if pool[0].free + rows[current].count < MAX_HYPOTHESES:
+            if pool[scratch.lane].free + rows[current].count < MAX_HYPOTHESES:
                 return len(nodes) - k
             load(rows[current], pool, work)
             count = rows[current].count
@@ -257,5 +257,5 @@ def advance(
             publish_suspended(row, node, anchors, belief)
         belief.state, belief.reason = row.publication.state, row.publication.reason
     if current >= 0:
-        store(rows[current], pool, work, count)
+        store(rows[current], pool, work, count, scratch.lane)
     return 0

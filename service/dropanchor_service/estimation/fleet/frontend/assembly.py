@@ -107,7 +107,7 @@ def assemble_nodes(
             r, t_ns = event.row, event.t_ns
             row, front, platform = rows[r], fronts[r], platforms[r]
             if event.kind == PRESSURE_EVENT:
-                event.anchor = add_pressure(heights, r, t_ns, event.value, event.std)
+                event.anchor = add_pressure(heights[r], t_ns, event.value, event.std)
                 continue
             if event.kind == HEADING_EVENT:
                 if row.settings.heading_source != IMU_ONLY:

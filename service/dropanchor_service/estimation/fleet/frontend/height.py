@@ -54,6 +54,9 @@ HEIGHT: Final = np.dtype(
         ("t_ns", "i8"),  # of the state
         ("pressure_ns", "i8"),  # of the last pressure
         ("reference_ns", "i8"),  # of the last pressure of the reference
+        ("shared_ns", "i8"),  # the same, when the batch began; 0: the reference tells nothing
+        ("shared_level", "f8"),  # log Pa, that the reference showed then
+        ("shared_var", "f8"),  # m^2, of it
         ("level", "f8"),  # log Pa, from which y counts: the first pressure, or the last one of the reference
         ("doubt", "f8"),  # m, innovation that is in doubt; 0: none
         ("doubt_ns", "i8"),  # since when
@@ -69,8 +72,8 @@ def start_height(h: Height, motion: int, told: float, std: float) -> None:
     h.motion, h.told, h.reference = motion, told, -1
     h.fed = h.referred = h.air_told = 0
     h.running = 1 if motion in (FREE, REFERENCE) else 0
-    h.t_ns = h.pressure_ns = h.reference_ns = h.doubt_ns = 0
-    h.level = h.doubt = 0.0
+    h.t_ns = h.pressure_ns = h.reference_ns = h.shared_ns = h.doubt_ns = 0
+    h.level = h.shared_level = h.shared_var = h.doubt = 0.0
     h.x[0], h.x[1], h.x[2] = told, 0.0, 0.0
     h.P[:] = 0.0
     if motion != REFERENCE:
@@ -78,9 +81,8 @@ def start_height(h: Height, motion: int, told: float, std: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def add_pressure(heights: Array, row: int, t_ns: int, pressure: float, temperature: float) -> int:
+def add_pressure(h: Height, t_ns: int, pressure: float, temperature: float) -> int:
     """Take a pressure, Pa, in air of this temperature, °C or NaN. Return what became of it."""
-    h = heights[row]
     if h.motion == FLAT:
         return UNUSED
     _predict_to(h, t_ns)
@@ -92,7 +94,7 @@ def add_pressure(heights: Array, row: int, t_ns: int, pressure: float, temperatu
         h.P[2, 2], h.P[0, 2], h.P[2, 0] = h.P[0, 0] + NOISE_STD**2, -h.P[0, 0], -h.P[0, 0]
         h.x[2] = -h.x[0]
     h.pressure_ns = max(t_ns, h.pressure_ns)
-    _refer(h, heights, air)
+    _refer(h, air)
     return _update(h, t_ns, K * air * (h.level - log_p))
 
 
@@ -109,26 +111,29 @@ def height_at(h: Height, t_ns: int, node: Node) -> None:
     node.height_source = BY_PRESSURE if h.fed == 1 else UNKNOWN
 
 
-@njit(nogil=True)
-def _level_of(h: Height) -> float:
-    """Return the logarithm of the pressure that a reference shows, without its noise."""
-    return float(h.level - (h.x[2] + h.told) / (K * STANDARD_AIR))
+@njit(cache=True, nogil=True)
+def share_references(heights: Array, rows: Array) -> None:
+    """Let these rows see their references as they are now, so that the order of rows in a batch makes no difference."""
+    for row in rows:
+        h = heights[row]
+        h.shared_ns = 0
+        if 0 <= h.reference < len(heights):
+            reference = heights[h.reference]
+            if reference.motion == REFERENCE and reference.fed == 1:
+                h.shared_ns, h.shared_var = reference.pressure_ns, reference.P[2, 2]
+                h.shared_level = reference.level - (reference.x[2] + reference.told) / (K * STANDARD_AIR)
 
 
 @njit(nogil=True)
-def _refer(h: Height, heights: Array, air: float) -> None:
+def _refer(h: Height, air: float) -> None:
     """Let y count from the reference: at its first pressure y and b change alike. Without it the last one holds."""
-    if h.motion == REFERENCE or h.reference < 0 or h.reference >= len(heights):
+    if h.motion == REFERENCE or h.shared_ns == 0:
         return
-    reference = heights[h.reference]
-    if reference.motion != REFERENCE or reference.fed == 0:
-        return
-    level = _level_of(reference)
     if h.referred == 0:
         h.referred = 1
-        h.x[2] += K * air * (level - h.level)
-        h.P[2, 2] += reference.P[2, 2]
-    h.level, h.reference_ns = level, reference.pressure_ns
+        h.x[2] += K * air * (h.shared_level - h.level)
+        h.P[2, 2] += h.shared_var
+    h.level, h.reference_ns = h.shared_level, h.shared_ns
 
 
 @njit(nogil=True)

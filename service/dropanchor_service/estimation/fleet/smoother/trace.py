@@ -77,21 +77,20 @@ class TracingEngine(FleetEngine):
         own = nodes["row"] == row
         return Run(nodes[own], beliefs[own], traces[own], hypotheses)
 
-    def _run_belief(self, nodes: Array) -> Array:
-        chunks = [self._trace(nodes[k : k + CHUNK]) for k in range(0, len(nodes), CHUNK)]
-        return np.concatenate([np.zeros(0, BELIEF), *chunks])
+    def _run_belief(self, nodes: Array, beliefs: Array, lane: int) -> int:
+        for k in range(0, len(nodes), CHUNK):
+            self._trace(nodes[k : k + CHUNK], beliefs[k : k + CHUNK], self._workspaces[lane])
+        return 0
 
-    def _trace(self, nodes: Array) -> Array:
-        beliefs, traces = np.zeros(len(nodes), BELIEF), np.zeros(len(nodes), TRACE)
-        room = np.zeros(len(nodes) * MAX_HYPOTHESES, TRACED)
+    def _trace(self, nodes: Array, beliefs: Array, workspace: Array) -> None:
+        traces, room = np.zeros(len(nodes), TRACE), np.zeros(len(nodes) * MAX_HYPOTHESES, TRACED)
         self._pool = fitted(self._pool, self._rows[: self._configured], MAX_HYPOTHESES * len(np.unique(nodes["row"])))
         used = advance_traced(
-            self._rows, self._pool, nodes, self._anchors, self._tuning_record, self._workspace, beliefs, traces, room
+            self._rows, self._pool, nodes, self._anchors, self._tuning_record, workspace, beliefs, traces, room
         )
         traces["first"] += self._traced
         self._traced += used
         self._steps.append(Run(nodes, beliefs, traces, room[:used].copy()))
-        return beliefs
 
 
 @njit(nogil=True, cache=True)

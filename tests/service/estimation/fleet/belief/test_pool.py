@@ -64,7 +64,7 @@ def test_every_slot_of_the_other_pool_is_free_or_taken_and_can_be_given_back() -
     used = [slot for row in rows for slot in slots_of(row, larger)]
     assert sorted(used + free_slots(larger)) == list(range(1, len(larger)))
     for row in rows:
-        release(row, larger)
+        release(row, larger, 0)
     assert sorted(free_slots(larger)) == list(range(1, len(larger)))
 
 
@@ -82,7 +82,7 @@ def test_a_pool_with_enough_room_stays_as_it_is() -> None:
 def test_the_pool_shrinks_again_when_hypotheses_die() -> None:
     rows, pool = taken([200, 150, 2])
     for row in rows[:2]:
-        release(row, pool)
+        release(row, pool, 0)
     smaller = fitted(pool, rows, ROOM)
     assert len(smaller) < 10 < 352 < len(pool)
     assert held(rows, smaller) == [[], [], [20.0, 21.0]]

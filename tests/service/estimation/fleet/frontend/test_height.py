@@ -19,6 +19,7 @@ from dropanchor_service.estimation.fleet.frontend.height import (
     UNUSED,
     add_pressure,
     height_at,
+    share_references,
     start_height,
 )
 from dropanchor_service.estimation.fleet.frontend.node import NODE
@@ -71,7 +72,7 @@ def run(
     rows = []
     for t_s, shown in zip(t.tolist(), (weather + noise * rng.standard_normal(len(t))).tolist(), strict=True):
         at = T0 + round(t_s * 1e9)
-        outcome = add_pressure(heights, TAG, at, pressure(height(t_s) + shown, air), math.nan)
+        outcome = add_pressure(heights[TAG], at, pressure(height(t_s) + shown, air), math.nan)
         node = read(heights, t_s)
         rows.append((node["height"] - height(t_s), node["height_std"], outcome))
     error, std, outcomes = np.array(rows).T
@@ -100,7 +101,7 @@ def test_a_climb_is_that_of_the_standard_atmosphere() -> None:
     for t_s in np.arange(0.0, 20.0, 0.1).tolist():
         climbed = min(max(t_s - 5.0, 0.0), 10.0)
         p = LOW * (1.0 - 2.25577e-5 * climbed) ** 5.25588
-        add_pressure(heights, TAG, T0 + round(t_s * 1e9), p, 15.0)
+        add_pressure(heights[TAG], T0 + round(t_s * 1e9), p, 15.0)
     assert read(heights, 20.0)["height"] == pytest.approx(10.0, abs=0.02)
 
 
@@ -148,8 +149,9 @@ def with_reference(weather: Height, until_s: float, dies_s: float) -> tuple[Arra
     for t_s in np.arange(0.0, until_s, 0.2).tolist():
         at, shown = T0 + round(t_s * 1e9), weather(t_s)
         if t_s < dies_s:
-            add_pressure(heights, REFERENCE, at, pressure(3.0 + shown + 7.0), math.nan)  # its sensor is 7 m off
-        add_pressure(heights, TAG, at, pressure(1.0 + shown - 4.0), math.nan)
+            add_pressure(heights[REFERENCE], at, pressure(3.0 + shown + 7.0), math.nan)  # its sensor is 7 m off
+        share_references(heights, np.array([TAG]))
+        add_pressure(heights[TAG], at, pressure(1.0 + shown - 4.0), math.nan)
         nodes.append(read(heights, t_s))
     return np.array(nodes)[::5], heights
 
@@ -184,16 +186,16 @@ def test_a_height_without_pressures_is_unknown_up_to_its_bound() -> None:
 def test_only_a_tag_that_is_told_nothing_follows_the_first_pressure() -> None:
     auto, flat = tags(), tags(HeightMotion.FLAT)
     assert read(auto, 0.0)["height_std"] == 0.0
-    assert add_pressure(auto, TAG, T0, LOW, math.nan) == ACCEPTED
+    assert add_pressure(auto[TAG], T0, LOW, math.nan) == ACCEPTED
     assert read(auto, 0.0)["height_source"] == BY_PRESSURE
-    assert add_pressure(flat, TAG, T0, LOW, math.nan) == UNUSED
+    assert add_pressure(flat[TAG], T0, LOW, math.nan) == UNUSED
     assert read(flat, 0.0)["height_std"] == 0.0
 
 
 def test_a_pressure_from_before_the_last_one_does_no_harm() -> None:
     heights = tags()
     for t_s in (10.0, 9.0, 10.1):
-        assert add_pressure(heights, TAG, T0 + round(t_s * 1e9), LOW, math.nan) == ACCEPTED
+        assert add_pressure(heights[TAG], T0 + round(t_s * 1e9), LOW, math.nan) == ACCEPTED
     node = read(heights, 10.2)
     assert node["height"] == pytest.approx(1.0, abs=0.01)
     assert np.isfinite(heights["P"][TAG]).all()

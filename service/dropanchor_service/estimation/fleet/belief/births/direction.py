@@ -13,9 +13,10 @@ from dropanchor_service.estimation.fleet.belief.births.numbers import (
     TURN_AFTER_STOP,
 )
 from dropanchor_service.estimation.fleet.belief.layout import Hypotheses, Hypothesis, Row, V
-from dropanchor_service.estimation.fleet.belief.mixture import copy_hypothesis
+from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis
 from dropanchor_service.estimation.fleet.belief.rigidity import is_mount_untold
 from dropanchor_service.estimation.fleet.belief.standing import SLOW
+from dropanchor_service.estimation.fleet.belief.start import starts_at_place
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import RESTING, Node
 from dropanchor_service.estimation.fleet.tuning import Tuning
@@ -24,6 +25,7 @@ STOOD_S: Final = 0.1  # s of rest after which a tag may drive off in the other d
 SLOW_EVERY: Final = 0.5  # s
 EVEN: Final = -0.7  # log of one half
 REFUSED: Final = 2.0  # standard deviations of speed in the other direction that are not noise
+DRIVEN: Final = 0.5  # m from the start after which a tag has a direction to turn back from
 TURNABOUT_DEPTH: Final = 8.0  # log weight below the best at which a hypothesis is not offered the other direction
 
 
@@ -38,6 +40,8 @@ def is_due(kind: int, row: Row, node: Node) -> bool:
 @njit(nogil=True)
 def admits(kind: int, one: Hypothesis, row: Row, t: Tuning) -> bool:
     """Return whether a hypothesis may turn back."""
+    if one.aligned == 0 and is_either_way(row, t):
+        return False
     if kind == SLOW_AHEAD:
         return may_drive_ahead(one)
     if kind == SLOW_BACK:
@@ -54,6 +58,15 @@ def make(kind: int, work: Hypotheses, source: int, target: int, row: Row) -> Non
         row.since_turnabout_s = 0.0
     if kind == SLOW_AHEAD:
         work[source].log_weight += EVEN
+
+
+@njit(nogil=True)
+def is_either_way(row: Row, t: Tuning) -> bool:
+    """Return whether a tag has not driven yet since a start with mounting angles all around.
+
+    There, one that drives off backwards is the one that is mounted the other way round.
+    """
+    return bool(starts_at_place(row) and row.settings.mount_angle_std > t.mount_cell and row.start.way < DRIVEN)
 
 
 @njit(nogil=True)
@@ -119,8 +132,10 @@ def wait_to_turn(row: Row, node: Node) -> None:
 
 @njit(nogil=True)
 def follow_rest(work: Hypotheses, count: int, row: Row, node: Node) -> None:
-    """Count the time at rest, where no hypothesis has a direction."""
+    """Count the time at rest, where no hypothesis has a direction, and the way from the start."""
     row.stood_s = row.stood_s + node.dt_s if node.rest == RESTING else 0.0
+    if node.rest != RESTING and row.start.way < DRIVEN:
+        row.start.way += abs(work[best_of(work, count)].mean[V]) * node.dt_s
     if node.rest == RESTING:
         for h in range(count):
             work[h].reverse = 0

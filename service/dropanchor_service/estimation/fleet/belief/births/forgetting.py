@@ -25,7 +25,7 @@ def forget(row: Row, parts: int) -> None:
     """Forget these parts of a row. Its hypotheses go where it starts again."""
     if parts & STARTED:
         row.start.range_count = 0
-        row.start.collected_s = 0.0
+        row.start.collected_s = row.start.way = 0.0
         row.heading.in_site_frame = 0
         row.publication.state = INITIALISING
         row.publication.information[:] = 0.0

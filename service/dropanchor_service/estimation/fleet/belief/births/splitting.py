@@ -18,13 +18,15 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 SPLIT_CENTRE, SPLIT_SIDE = 0.5496, 0.2252  # weights of the three parts
 SPLIT_SHIFT = 1.0576  # standard deviations
 SPLIT_REMOVED = 0.549  # share of the variance
+LEAST_WAY = 0.1  # m, driven since the start, before which nothing is split
 LEAST_RATE = 0.01  # m/s, error of a range rate below which nothing is split
 
 
 @njit(nogil=True)
 def is_due(kind: int, work: Hypotheses, count: int, row: Row, node: Node) -> bool:
     """Return whether hypotheses may need a split: only a motion makes a wide angle non-linear."""
-    return bool(node.rest == MOVING and (kind == SPLIT_WIDE or may_split_curved(work, count, row)))
+    moved = node.rest == MOVING and row.start.way >= LEAST_WAY
+    return bool(moved and (kind == SPLIT_WIDE or may_split_curved(work, count, row)))
 
 
 @njit(nogil=True)
