@@ -30,7 +30,7 @@ def engine_cost(name: str, tags: int, messages: int) -> float:
         engine.configure(row, tag_columns(start, 0.0))
     spent_s = 0.0
     for sequence in range(WARM_UP + messages):
-        batch = _columns(motions, tags, sequence)
+        batch = columns_of(motions, tags, sequence)
         started_s = time.process_time()
         engine.process(batch)
         spent_s += (time.process_time() - started_s) * (sequence >= WARM_UP)
@@ -55,7 +55,8 @@ def _payload(motions: list[Track], tag: int, sequence: int) -> bytes:
     return message(motions[tag % len(motions)].bodies[sequence], sequence, tag + 1, T0_NS + sequence * STEP_NS)
 
 
-def _columns(motions: list[Track], tags: int, sequence: int) -> SampleBatch:
+def columns_of(motions: list[Track], tags: int, sequence: int) -> SampleBatch:
+    """Return message `sequence` of every tag as columns."""
     decoded = decode([_payload(motions, tag, sequence) for tag in range(tags)], [ENCODING_PACKED] * tags)
     ranges = np.zeros(len(decoded.ranges), RANGE)
     ranges["row"], ranges["t_ns"] = decoded.ranges["message"], decoded.ranges["t_ns"]

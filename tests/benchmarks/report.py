@@ -28,6 +28,7 @@ SOURCES = {
     "shard": (*_WHOLE, "cluster", "shards", "ownership", "checkpoints"),
     "small": (*_WHOLE, "runtime", "events", "delivery"),
     "sites": ("estimation/fleet", "ingest", "store"),
+    "threads": ("estimation",),
     "walk": ("dashboard",),
     "zones": ("zones",),
 }

@@ -55,13 +55,14 @@ def lost(sent_messages: int, since: Counters, until: Counters) -> int:
     return sent_messages * SAMPLES_PER_MESSAGE - int(until.fused - since.fused)
 
 
-def settings_file(tags: int, folder: Path) -> Path:
-    """Write settings with an anchor at the origin and the start of every tag."""
+def settings_file(tags: int, folder: Path, threads: int | None = None) -> Path:
+    """Write settings with an anchor at the origin and the start of every tag. threads: of the engine, None: its own."""
     starts = [track.start for track in tracks(1.0)]
     tables = [
         f"[tags.sim-{i}.start]\nx = {x!r}\ny = {y!r}\nheading_rad = {heading!r}"
         for i, (x, y, heading) in ((i, starts[i % len(starts)]) for i in range(tags))
     ]
     file = folder / f"fleet-{tags}.toml"
-    file.write_text(f'max_tags = {MAX_TAGS}\n[[site.anchors]]\nid = "{ANCHOR}"\n' + "\n".join(tables))
+    engine = "" if threads is None else f"engine_threads = {threads}\n"
+    file.write_text(f'{engine}max_tags = {MAX_TAGS}\n[[site.anchors]]\nid = "{ANCHOR}"\n' + "\n".join(tables))
     return file

@@ -45,21 +45,32 @@ class Figures:
         return float(np.percentile(self.latency_ms, q)) if self.latency_ms else float("inf")
 
 
-def run_step(tags: int, folder: Path, engine: str = "fleet", embedded: bool = False, share: float = 1.0) -> Figures:
-    """Measure a fleet of `tags` tags. embedded: the service is the router. share: of the time that the service runs."""
+def run_step(
+    tags: int,
+    folder: Path,
+    embedded: bool = False,
+    share: float = 1.0,
+    warm_up_s: float = WARM_UP_S,
+    threads: int | None = None,
+) -> Figures:
+    """Measure a fleet of `tags` tags, which all start at once, from warm_up_s on.
+
+    embedded: the service is the router. share: of the time that the service runs. threads: of the engine, None: as many
+    as it takes by itself.
+    """
     endpoint = free_endpoint()
     link = "--zenoh-listen" if embedded else "--zenoh-connect"
     with ExitStack() as stack:
         routing = None if embedded else stack.enter_context(router(endpoint))
-        arguments = ("--config", str(settings_file(tags, folder)), "--engine", engine, link, endpoint)
+        arguments = ("--config", str(settings_file(tags, folder, threads)), link, endpoint)
         service = stack.enter_context(running_service(*arguments))
-        fleet = generator(endpoint, tags, WARM_UP_S + MEASURE_S + 1.0)
+        fleet = generator(endpoint, tags, warm_up_s + MEASURE_S + 1.0)
         stack.callback(fleet.end)
         stack.enter_context(proc.throttled(service.process.pid, share))
         start_ns = (time.time_ns() + 300_000_000) // 1000 * 1000
         at_first = counters(service)
         fleet.send_line(start_ns)
-        time.sleep(WARM_UP_S + 0.3)
+        time.sleep(warm_up_s + 0.3)
         before, router_before, began_s = counters(service), _cpu(routing), time.monotonic()
         latency_ms = latencies_ms(endpoint, tags, start_ns, MEASURE_S)
         after, router_after, spent_s = counters(service), _cpu(routing), time.monotonic() - began_s

@@ -71,7 +71,7 @@ MEASUREMENTS = (
         numbers.PUSHED_BACK,
         "pushed-back",
         BEFORE_RANGE,
-        "accelerometer; speed beyond its direction by 2 sd",
+        "accelerometer; speed beyond its direction by 2 sd; straight, or 0.5 m from its fan",
         "ahead or reverse",
         "the other direction",
         "reverse_log_prior",
