@@ -93,8 +93,7 @@ class FleetEngine:
         due = self._queue.due(samples, len(self._anchors))
         if not len(due.order):
             return PoseBatch(rejected=due.rejected, unused=due.unused, lags=due.lags)
-        if self._referring:
-            share_references(self._heights, np.fromiter(self._referring, np.int64))
+        share_references(self._heights, np.fromiter(self._referring, np.int64))
         self._pool = fitted(self._pool, self._rows[: self._configured], MAX_HYPOTHESES, self._lanes.count)
         verdicts = np.zeros(len(samples.imu), np.uint8)
         cuts = self._lanes.cut(due.order, samples.imu["row"], due.events["row"])
@@ -121,7 +120,7 @@ class FleetEngine:
         rows = (self._fronts, self._platforms, self._rows, self._heights)
         nodes = nodes[: assemble_nodes(imu, due.events, order, *rows, nodes, verdicts)]
         beliefs = np.zeros(len(nodes), BELIEF)
-        return _Run(nodes, beliefs, self._run_belief(nodes, beliefs, lane))
+        return _Run(nodes, beliefs, self._run_belief(nodes, beliefs, lane) if len(nodes) else 0)
 
     def _run_belief(self, nodes: Array, beliefs: Array, lane: int) -> int:
         """Run the belief over the nodes. Return how many are left because the pool has no room."""
