@@ -47,6 +47,7 @@ export default {
   "figure.height_title": "Entlang der z-Achse der Anker, mit ihrer Standardabweichung",
   "figure.height_told": "{height}, wie angegeben",
   "figure.height_pressure": "{height} ± {error}, aus dem Luftdruck",
+  "figure.height_start": "{height} ± {error} über dem Start",
   "figure.height_unknown": "unbekannt: keine Luftdruckwerte",
   "figure.floor": "Stockwerk",
   "figure.floor_title": "Das wahrscheinlichste der Stockwerke, die die Pläne haben, nach der Höhe und ihrer Standardabweichung",

@@ -47,6 +47,7 @@ export default {
   "figure.height_title": "Along the anchors' z axis, with its standard deviation",
   "figure.height_told": "{height}, as told",
   "figure.height_pressure": "{height} ± {error}, from pressure",
+  "figure.height_start": "{height} ± {error} above its start",
   "figure.height_unknown": "unknown: no pressures",
   "figure.floor": "Floor",
   "figure.floor_title": "The likeliest of the floors that the plans have, by the height and its standard deviation",
