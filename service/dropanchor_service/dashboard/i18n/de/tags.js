@@ -107,7 +107,7 @@ export default {
   "figures.failed": "Die Datei ließ sich nicht laden. Versuchen Sie es erneut.",
   "figures.no_parquet": "Dieser Dienst kann kein Parquet schreiben. Installieren Sie dort dropanchor-service[parquet].",
   "figures.si": "Dateien haben SI-Einheiten: m und m/s.",
-  "figures.no_georeference": "GeoJSON und GPX brauchen Breite und Länge: Legen Sie zuerst die Georeferenz des Standorts fest.",
+  "figures.no_georeference": "GeoJSON, GPX und KML brauchen Breite und Länge: Legen Sie zuerst die Georeferenz des Standorts fest.",
   "figures.all": "Kennzahlen",
   "figures.all_what": "Strecke, Geschwindigkeit und Zeit in Zonen aller Tags in diesem Zeitraum",
   "figures.unreadable": "Die Kennzahlen lassen sich nicht lesen. Wählen Sie einen kürzeren Zeitraum oder eine Gruppe.",

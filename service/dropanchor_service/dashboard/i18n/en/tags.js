@@ -107,7 +107,7 @@ export default {
   "figures.failed": "The file could not be loaded. Try again.",
   "figures.no_parquet": "This service cannot write Parquet. Install dropanchor-service[parquet] there.",
   "figures.si": "Files are in SI units: m and m/s.",
-  "figures.no_georeference": "GeoJSON and GPX need latitude and longitude: set the site's georeference first.",
+  "figures.no_georeference": "GeoJSON, GPX and KML need latitude and longitude: set the site's georeference first.",
   "figures.all": "Figures",
   "figures.all_what": "Distance, speed and time in zones of all tags in this period",
   "figures.unreadable": "The figures cannot be read. Choose a shorter period, or a group.",
