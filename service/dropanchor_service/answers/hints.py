@@ -61,8 +61,8 @@ MOUNT_UNKNOWN = say(
 )
 HEIGHT_UNTOLD = say(
     "height_untold",
-    "No floor is named, because nobody told the height at which this tag starts: set it (`height_m`; if it is 0, also "
-    "`height_told`).",
+    "No floor is named, because the height at which this tag started is not known: set it (`height_m`; if it is 0, "
+    "also `height_told`).",
 )
 RANGES_COME = say(
     "ranges_come", "Ranges arrive, but too late or too rarely: check the network, and the rate of the radio."

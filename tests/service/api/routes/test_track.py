@@ -98,8 +98,8 @@ def test_gpx_and_geojson_hold_geographic_coordinates(tmp_path: Path) -> None:
 def test_kml_holds_times_and_places_in_a_track_for_each_stretch_without_a_gap(tmp_path: Path) -> None:
     bench = driven(tmp_path, GEOREFERENCED)
     bench.now_ns += 60 * SECOND
-    for second in range(3):
-        bench.move("a", x=7.0 * second)
+    for x in (0.0, 7.0, 14.0):
+        bench.move("a", x=x)
         bench.now_ns += SECOND
     bench.write_history()
     kml = ask(bench.app(), "GET", "/api/v1/tags/a/track?format=kml")

@@ -93,7 +93,7 @@ export default {
   "say.in_bursts": "Messwerte kommen in Schüben von {seconds} s: Lassen Sie das Tag kleinere Pakete senden, und prüfen Sie sein Netz.",
   "say.few_ranges": "Eine Distanz in {seconds} s ist zu wenig: Erhöhen Sie die Rate des Funkmoduls, oder bringen Sie das Tag näher an den Anker.",
   "say.mount_unknown": "Der Einbauwinkel ist noch nicht bekannt: Biegen Sie einmal links und rechts ab, oder legen Sie ihn fest (`mount_angle_rad`).",
-  "say.height_untold": "Kein Stockwerk wird genannt, weil niemand die Höhe angegeben hat, in der dieses Tag startet: Geben Sie sie an (`height_m`; wenn sie 0 ist, auch `height_told`).",
+  "say.height_untold": "Kein Stockwerk wird genannt, weil die Höhe nicht bekannt ist, in der dieses Tag gestartet ist: Geben Sie sie an (`height_m`; wenn sie 0 ist, auch `height_told`).",
   "say.all_zero": "Seine letzten {count} Distanzen sind alle 0: Das Funkmodul misst keine Distanz. Prüfen Sie es und den Anker.",
   "say.ranges_come": "Distanzen kommen an, aber zu spät oder zu selten: Prüfen Sie das Netz und die Rate des Funkmoduls.",
   "say.motion_comes": "In der Bewegung dieses Tags war eine Lücke; nach einigen Sekunden ohne Lücke wird sie wieder verwendet: Prüfen Sie sein Netz.",

@@ -93,7 +93,7 @@ export default {
   "say.in_bursts": "Samples come in bursts of {seconds} s: let the tag send smaller batches, and check its network.",
   "say.few_ranges": "One range in {seconds} s is too few: raise the rate of the radio, or bring the tag nearer to the anchor.",
   "say.mount_unknown": "The mounting angle is not known yet: turn left and right once, or set it (`mount_angle_rad`).",
-  "say.height_untold": "No floor is named, because nobody told the height at which this tag starts: set it (`height_m`; if it is 0, also `height_told`).",
+  "say.height_untold": "No floor is named, because the height at which this tag started is not known: set it (`height_m`; if it is 0, also `height_told`).",
   "say.all_zero": "Its last {count} ranges are all 0: the radio measures no distance, so check it and the anchor.",
   "say.ranges_come": "Ranges arrive, but too late or too rarely: check the network, and the rate of the radio.",
   "say.motion_comes": "The motion of this tag had a gap, and is used again after some seconds without one: check its network.",
