@@ -23,7 +23,8 @@ which
 `dropanchor replay` and `dropanchor-tag replay` read. It says what it decided, converts and leaves out.
 
 A SOURCE is one of
-  a bag of ROS             ROS 1 (.bag), ROS 2 (folder, .mcap, .db3): sensor_msgs/Imu, MagneticField, Range, and others
+  a bag of ROS             ROS 1 (.bag), ROS 2 (folder, .mcap, .db3): sensor_msgs/Imu, MagneticField, Range,
+                           FluidPressure, and others
                            with --map
   an MCAP file             with messages in JSON, or a recording of this service
   an export of a phone     Sensor Logger or phyphox: the folder, or the zip

@@ -180,6 +180,10 @@ class Messages:
             magnetic_field_covariance=np.zeros(9),
         )
 
+    def pressure(self, t_ns: int, pascal: float) -> Any:
+        kind = "sensor_msgs/msg/FluidPressure"
+        return self.make(kind, header=self.header(t_ns), fluid_pressure=pascal, variance=4.0)
+
     def range(self, t_ns: int, range_m: float, std_m: float = 0.0) -> Any:
         names = {field[0] for field in self.store.fielddefs["sensor_msgs/msg/Range"][1]}
         variance = {"variance": std_m**2} if "variance" in names else {}

@@ -220,13 +220,3 @@ def test_the_axes_of_the_imu_can_be_turned(run: Import) -> None:
     run.file("s/uwb.csv", PLAIN)
     ended = run(run.folder / "s", "--forward=-y", "--up", "z")
     assert [ended.column("imu", axis)[0] for axis in ("ax", "ay", "az")] == [-2, 1, 9.81]
-
-
-@pytest.mark.parametrize(
-    ("column", "value"),
-    [("pressure", 98_725), ("baro [hPa]", 987.25), ("pressure_mbar", 987.25), ("Air pressure (kPa)", 98.725)],
-)
-def test_a_column_of_pressures_is_found_and_converted(run: Import, column: str, value: float) -> None:
-    ended = run(run.file("baro.csv", f"t,{column}\n0.0,{value}\n1.0,{value}\n"), run.file("uwb.csv", PLAIN))
-    assert ended.status == 0, ended.error
-    assert ended.column("pressure", "pressure_pa") == pytest.approx([98_725.0] * 2)
