@@ -200,6 +200,7 @@ SCALARS = (
         second_outside=Reason.TEMPERATURE_ABSURD,
     ),
 )
+PRESSURE = SCALARS[-1]
 KINDS: tuple[Kind, ...] = (IMU, *SCALARS)
 """In the order of a packed payload and of its counts; a new kind comes last."""
 KIND_OF: dict[type[Any], Kind] = {kind.sample: kind for kind in KINDS}

@@ -45,11 +45,15 @@ class Frame(StrEnum):
 
 
 class HeightSource(StrEnum):
-    """Where the height of a pose comes from: the settings of the tag, its barometer, or nowhere."""
+    """Where the height of a pose comes from: the settings of the tag, its barometer, or nowhere.
+
+    A height from the `start` counts from where the tag started, because nobody told the height there.
+    """
 
     TOLD = "told"
     PRESSURE = "pressure"
     UNKNOWN = "unknown"
+    START = "start"
 
 
 class _Answer(BaseModel):
@@ -133,7 +137,9 @@ class Pose(_Answer):
     z: float | None = Field(default=None, description="Height along the anchors' z axis, m, as `z_source` tells it.")
     z_std_m: float | None = Field(default=None, description="Standard deviation of z, m.")
     z_source: HeightSource | None = Field(
-        default=None, description="`unknown`: the tag is set to `free` and sends no pressures. Null without z."
+        default=None,
+        description="`unknown`: the tag is set to `free` and sends no pressures. `start`: z counts from where "
+        "the tag started, because nobody told the height there, so no floor is named. Null without z.",
     )
     floor: str | None = Field(
         default=None, description="The floor of the plans that is likeliest by z and z_std_m; null without one."

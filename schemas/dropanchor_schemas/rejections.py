@@ -111,7 +111,8 @@ REASONS_EXPLAINED: dict[Reason, Explanation] = {
         "sample", "the sensor failed its check (units, axes, silence), as the tag's hint says"
     ),
     Reason.PRESSURE_NOT_PA: Explanation(
-        "sample", "a pressure below 30,000 Pa: about 1013 looks like hPa, about 101 like kPa; send Pa"
+        "sample",
+        "a pressure below 30,000 Pa: 1013 looks like hPa, multiply it by 100; 101 like kPa, multiply it by 1000",
     ),
     Reason.PRESSURE_ABSURD: Explanation("sample", "a pressure above 110,000 Pa"),
     Reason.TEMPERATURE_ABSURD: Explanation("sample", "a pressure with a temperature outside -60 to 85 °C"),

@@ -115,7 +115,14 @@ class TagSettings(_Settings):
         default=None, description="Colour that marks the tag on the map, such as #0b62b8; null: none."
     )
     group: Label = Field(default="", description="Group that lists and streams can select; empty: none.")
-    height_m: Number = Field(default=0.0, description="Height of the tag's antenna, along the anchors' z axis.")
+    height_m: Number = Field(
+        default=0.0, description="Height of the tag's antenna where it starts, along the anchors' z axis."
+    )
+    height_told: StrictBool | None = Field(
+        default=None,
+        description="Whether `height_m` is the height at which the tag starts; null: unless it is 0, which tags have "
+        "that nobody told a height. Without it no floor is named.",
+    )
     height_motion: Literal["auto", "flat", "free", "reference"] = Field(
         default="auto",
         description="What this height does; auto: it stays, or follows the tag's barometer once it sends pressures; "
@@ -191,6 +198,11 @@ class TagSettings(_Settings):
         default="m", description="Unit in which the tag sends ranges and their standard deviation."
     )
     start: StartPose | None = Field(default=None, description="Where the tag starts, if known.")
+
+    @property
+    def tells_height(self) -> bool:
+        """Return whether the height at which the tag starts is known."""
+        return self.height_m != 0.0 if self.height_told is None else self.height_told
 
     def over(self, defaults: "TagSettings") -> "TagSettings":
         """Return these settings, with those of `defaults` where nothing was given."""

@@ -8,7 +8,7 @@ from dropanchor_evaluation.climbs import CLIMBS, Barometer, Height, climbing
 from dropanchor_evaluation.product.rows import Row
 from dropanchor_evaluation.product.runs import TagRun, sources, tag_run
 from dropanchor_evaluation.product.work import run_tags
-from dropanchor_evaluation.storeys import FloorScore, floor_score, lift, slammed
+from dropanchor_evaluation.storeys import FloorScore, floor_score, lift, slammed, warmed
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 
 SEEDS = range(5000, 5008)
@@ -40,3 +40,9 @@ def test_a_door_that_slams_makes_no_wrong_floor_believed(runs: list[TagRun], hei
     quiet, slammed_once = floors(runs, height), floors(runs, height, slammed)
     assert slammed_once.wrong <= quiet.wrong
     assert slammed_once.believed < quiet.believed  # meanwhile no floor is sure
+
+
+@pytest.mark.parametrize("pa_per_k", [-0.6, 0.6])  # data sheet of the BMP390; a BMP280 has 1.5 Pa/K, and is 2.5 m off
+def test_a_barometer_in_the_sun_hardly_makes_a_wrong_floor_believed(runs: list[TagRun], pa_per_k: float) -> None:
+    found = floors(runs, lift, lambda run: warmed(run, pa_per_k, 20.0))
+    assert found.wrong <= 0.005 * found.poses

@@ -7,7 +7,7 @@ import numpy as np
 from dropanchor_schemas.sentences import say
 from dropanchor_service.answers.findings import sentence_of
 from dropanchor_service.answers.unused import hints_about_unused
-from dropanchor_service.estimation.columns import Array, Frame, StateReason
+from dropanchor_service.estimation.columns import Array, Frame, HeightSource, StateReason
 from dropanchor_service.store.arrivals import BURSTS, FORGOTTEN_BURSTS, LATE_S, RANGE_S, ZEROS
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import KINDS, TagTable
@@ -58,6 +58,11 @@ RELATIVE_HINT = say(
 MOUNT_UNKNOWN = say(
     "mount_unknown",
     "The mounting angle is not known yet: turn left and right once, or set it (`mount_angle_rad`).",
+)
+HEIGHT_UNTOLD = say(
+    "height_untold",
+    "No floor is named, because the height at which this tag started is not known: set it (`height_m`; if it is 0, "
+    "also `height_told`).",
 )
 RANGES_COME = say(
     "ranges_come", "Ranges arrive, but too late or too rarely: check the network, and the rate of the radio."
@@ -121,7 +126,7 @@ _NO_RANGES = (StateReason.NO_RANGE, StateReason.RANGES_MISSING)
 _NO_MOTION = (StateReason.NO_HEADING, StateReason.IMU_MISSING)
 _NOTHING_NEW = (StateReason.RESOLVED, *_NO_RANGES, StateReason.IMU_MISSING)
 _LITTLE_KNOWN = (StateReason.RESOLVED, *_NO_RANGES, StateReason.SEVERAL_MODES, StateReason.UNCERTAIN)
-_IMU, _RANGE, _HEADING = (KINDS.index(name) for name in ("imu", "range", "heading"))
+_IMU, _RANGE, _HEADING, _PRESSURE = (KINDS.index(name) for name in ("imu", "range", "heading", "pressure"))
 
 Hints = tuple[Sequence[str], Array]
 """All texts, and the index of the text of each POSE."""
@@ -158,7 +163,7 @@ def hints_of(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> Hint
     for text, wrong in _wrong_times(poses, tags, now_ns):
         hint[wrong] = len(texts)
         texts.append(text)
-    for text, where in _lags(poses, tags, hint):
+    for text, where in (*_without_floor(poses, site, tags, hint), *_lags(poses, tags, hint)):
         hint[where] = len(texts)
         texts.append(text)
     return texts, hint
@@ -218,6 +223,16 @@ def _zeros(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[str, int
     zero = (arrivals["zeros"] >= ZEROS) & ((now_ns - arrivals["range_ns"]) * 1e-9 < SENDING_S)
     for place, count in zip(places[zero].tolist(), arrivals["zeros"][zero].tolist(), strict=True):
         yield all_zero(count), place
+
+
+def _without_floor(poses: Array, site: SiteStore, tags: TagTable, hint: Array) -> list[tuple[str, Array]]:
+    """Return the hint for tags with a barometer that could be on a floor if somebody told where they start."""
+    if not site.floors.names:
+        return []
+    places = np.flatnonzero((poses["z_source"] == HeightSource.START) & (hint == StateReason.RESOLVED))
+    samples = tags.counts(poses["row"][places])["samples"] if len(places) else np.zeros((0, len(KINDS)))
+    places = places[samples[:, _PRESSURE] > 0]
+    return [(HEIGHT_UNTOLD, places)] if len(places) else []
 
 
 def _lags(poses: Array, tags: TagTable, hint: Array) -> Iterator[tuple[str, Array]]:

@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from dropanchor_schemas.kinds import PRESSURE
 from dropanchor_schemas.rejections import Reason
 from dropanchor_schemas.sentences import say
 from dropanchor_service.estimation.columns import Array
@@ -64,7 +65,7 @@ WHY: Final[dict[str, dict[Reason, str | None]]] = {
     "bearing": _ANY | {Reason.BEARING_ABSURD: TURNS},
     "pressure": _ANY
     | {
-        Reason.PRESSURE_NOT_PA: say("why_pressure_not_pa", "a pressure of about 1013 looks like hPa, so send Pa"),
+        Reason.PRESSURE_NOT_PA: say("why_pressure_not_pa", "no air has so low a pressure, so send Pa"),
         Reason.PRESSURE_ABSURD: say("why_pressure_absurd", "no air has such a pressure, so send Pa"),
         Reason.TEMPERATURE_ABSURD: say("why_temperature_absurd", "no air has such a temperature, so send °C"),
         Reason.PRESSURE_DOUBTED: say(
@@ -88,6 +89,12 @@ WHY: Final[dict[str, dict[Reason, str | None]]] = {
         Reason.LENGTH_MISMATCH: DAMAGED,
     },
 }
+
+
+_PRESSURE_UNITS: Final = (
+    (100.0, say("why_pressure_in_hpa", "they look like hPa, so multiply them by 100")),
+    (1_000.0, say("why_pressure_in_kpa", "they look like kPa, so multiply them by 1000")),
+)
 
 
 def not_used(count: int, of: int, what: str, why: str) -> str:
@@ -137,4 +144,8 @@ def _why(what: str, rejected: Array, row: int, tags: TagTable) -> str | None:
         behind_s = (arrivals["newest_imu_ns"] - arrivals["newest_range_ns"]) * 1e-9
         if behind_s > BEHIND_S:
             return behind(behind_s)
+    if reason is Reason.PRESSURE_NOT_PA:
+        low, high = PRESSURE.limits
+        sent = tags.rows.low_pressures.get(row, 0.0)
+        return next((why for factor, why in _PRESSURE_UNITS if low <= sent * factor <= high), WHY[what][reason])
     return WHY[what][reason]

@@ -18,11 +18,13 @@ from dropanchor_tag_client.sources.axes import AXES, mounting
 from dropanchor_tag_client.sources.phones.pairing import Signs
 
 DESCRIPTION = """\
-Turns what you have into a recording: a folder with range.csv, imu.csv, heading.csv and anchors.csv, which
+Turns what you have into a recording: a folder with range.csv, imu.csv, heading.csv, pressure.csv and anchors.csv,
+which
 `dropanchor replay` and `dropanchor-tag replay` read. It says what it decided, converts and leaves out.
 
 A SOURCE is one of
-  a bag of ROS             ROS 1 (.bag), ROS 2 (folder, .mcap, .db3): sensor_msgs/Imu, MagneticField, Range, and others
+  a bag of ROS             ROS 1 (.bag), ROS 2 (folder, .mcap, .db3): sensor_msgs/Imu, MagneticField, Range,
+                           FluidPressure, and others
                            with --map
   an MCAP file             with messages in JSON, or a recording of this service
   an export of a phone     Sensor Logger or phyphox: the folder, or the zip
@@ -40,6 +42,7 @@ command prints the mapping that it guessed, to paste and correct.
   anchor                                               the column with the id of the anchor
   range.ID                 as range                    a column with the ranges to the anchor ID
   heading, heading_std     rad deg deg_compass         counter-clockwise from east; deg_compass: clockwise from north
+  pressure                 Pa hPa kPa                  of the air, from a barometer
   t_nsec                                               nanoseconds to add to t
 A unit may have a number: ax=raw_x:g/16384. SOURCE/FIELD=… is for one table or topic: uwb.csv/t=time:ms.
 

@@ -163,6 +163,7 @@ class HeightSource(IntEnum):
     TOLD = 0
     PRESSURE = 1
     UNKNOWN = 2
+    START = 3  # it counts from the height of the start, which nobody told
 
 
 class State(IntEnum):

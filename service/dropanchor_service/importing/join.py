@@ -45,6 +45,7 @@ class Joined:
     imu: Imu
     ranges: Ranges
     headings: Headings
+    pressures: Stream
     anchors: dict[str, Position]
     t0_ns: int
 
@@ -53,7 +54,7 @@ def merged(parts: Sequence[tuple[str, Readings]]) -> Readings:
     """Return the readings of all sources, each with its name. Raises ImportingError where two hold the same."""
     whole = Readings()
     for source, part in parts:
-        for sensor in ("acc", "gyro", "mag"):
+        for sensor in ("acc", "gyro", "mag", "pressure"):
             stream = getattr(part, sensor)
             if len(stream) and len(getattr(whole, sensor)):
                 raise ImportingError(
@@ -72,7 +73,7 @@ def merged(parts: Sequence[tuple[str, Readings]]) -> Readings:
     return whole
 
 
-_NAMES = {"acc": "accelerometer", "gyro": "gyroscope", "mag": "magnetometer"}
+_NAMES = {"acc": "accelerometer", "gyro": "gyroscope", "mag": "magnetometer", "pressure": "barometer"}
 
 
 def joined(readings: Readings, mounted: Mounting | None = None) -> Joined:
@@ -81,15 +82,19 @@ def joined(readings: Readings, mounted: Mounting | None = None) -> Joined:
     if mounted is not None:
         rotation = np.array(mounted, np.float64).T
         imu = Imu(imu.t_ns, imu.acc @ rotation, imu.gyro @ rotation, imu.mag @ rotation)
-    times = [kind.t_ns for kind in (imu, readings.ranges, readings.headings) if len(kind)]
+    times = [kind.t_ns for kind in (imu, readings.ranges, readings.headings, readings.pressure) if len(kind)]
     first_ns = min((int(t_ns[0]) for t_ns in times), default=0)
-    _require_one_clock({"IMU": imu.t_ns, "ranges": readings.ranges.t_ns, "headings": readings.headings.t_ns})
+    _require_one_clock(
+        {"IMU": imu.t_ns, "ranges": readings.ranges.t_ns, "headings": readings.headings.t_ns}
+        | {"pressures": readings.pressure.t_ns}
+    )
     t0_ns = first_ns // NS_PER_S * NS_PER_S if not 0 <= first_ns < _KEPT_NS else 0
     ranges, headings = readings.ranges, readings.headings
     return Joined(
         Imu(imu.t_ns - t0_ns, imu.acc, imu.gyro, imu.mag),
         Ranges(ranges.t_ns - t0_ns, ranges.anchors, ranges.range_m, ranges.std_m),
         Headings(headings.t_ns - t0_ns, headings.yaw_rad, headings.std_rad),
+        Stream(readings.pressure.t_ns - t0_ns, readings.pressure.values),
         readings.anchors,
         t0_ns,
     )

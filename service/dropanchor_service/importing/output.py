@@ -14,7 +14,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.join import Joined
 from dropanchor_service.importing.progress import shown
 from dropanchor_service.importing.readings import ImportingError, Position
-from dropanchor_tag_client.recording.columns import FILES, HEADING, IMU
+from dropanchor_tag_client.recording.columns import FILES, HEADING, IMU, PRESSURE
 
 _FILES = tuple(f"{file.name}.csv{end}" for file in FILES for end in ("", ".gz"))
 
@@ -42,6 +42,10 @@ def write_recording(folder: Path, joined: Joined, anchors: dict[str, Position]) 
         if len(headings):
             columns = [headings.yaw_rad, headings.std_rad]
             _write_columns(part / "heading.csv", ("t_s", *HEADING.numbers), headings.t_ns, columns)
+        if len(joined.pressures):
+            columns = list(joined.pressures.values.T)
+            header = ("t_s", *PRESSURE.numbers[: len(columns)])
+            _write_columns(part / "pressure.csv", header, joined.pressures.t_ns, columns)
 
 
 @contextmanager

@@ -1,6 +1,6 @@
 """What a source holds: readings in SI units and the axes of the tag, and what was found on the way."""
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,6 +9,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.streams import Stream, make_stream, no_readings
 
 ACC, GYRO, MAG, RANGE, HEADING, TIME = "acc", "gyro", "mag", "range", "heading", "time"
+PRESSURE = "pressure"
 MAX_EXAMPLES = 3
 
 Position = tuple[float, float, float]
@@ -98,11 +99,15 @@ def no_headings() -> Headings:
 
 @dataclass
 class Readings:
-    """What one source or several hold. notes: what was decided and converted, for the person. units: by quantity."""
+    """What one source or several hold. notes: what was decided and converted, for the person. units: by quantity.
+
+    pressure: Pa, and in a second column the temperature of the air, °C, where it is known.
+    """
 
     acc: Stream = field(default_factory=no_readings)
     gyro: Stream = field(default_factory=no_readings)
     mag: Stream = field(default_factory=no_readings)
+    pressure: Stream = field(default_factory=no_readings)
     ranges: Ranges = field(default_factory=no_ranges)
     headings: Headings = field(default_factory=no_headings)
     anchors: dict[str, Position] = field(default_factory=dict)
@@ -112,9 +117,16 @@ class Readings:
 
     @property
     def is_empty(self) -> bool:
-        return not (
-            len(self.acc) or len(self.gyro) or len(self.mag) or len(self.ranges) or len(self.headings) or self.anchors
+        held: tuple[Sized, ...] = (
+            self.acc,
+            self.gyro,
+            self.mag,
+            self.pressure,
+            self.ranges,
+            self.headings,
+            self.anchors,
         )
+        return not any(map(len, held))
 
 
 def stream_of(t_ns: Array, values: Array, source: str, what: str, left_out: LeftOut) -> Stream:

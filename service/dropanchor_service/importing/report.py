@@ -28,6 +28,9 @@ def report(joined: Joined) -> list[str]:
     if len(headings):
         degrees = np.degrees(headings.yaw_rad)
         rows.append(_row("heading", headings.t_ns, f"{degrees.min():.0f}° to {degrees.max():.0f}°"))
+    if len(joined.pressures):
+        pa = joined.pressures.values[:, 0]
+        rows.append(_row("pressure", joined.pressures.t_ns, f"{pa.min():.0f} to {pa.max():.0f} Pa"))
     return [*_aligned(rows), *_clocks(joined)]
 
 

@@ -9,7 +9,7 @@ from dropanchor_service.estimation.columns import Array
 
 @dataclass(frozen=True)
 class Stream:
-    """Readings in order of time, one for each time. t_ns: (n,) int64, UTC. values: (n, 3) float64."""
+    """Readings in order of time, one for each time. t_ns: (n,) int64, UTC. values: (n, 3), or (n, k) without axes."""
 
     t_ns: Array
     values: Array
@@ -36,7 +36,8 @@ class Stream:
 def make_stream(t_ns: Array, values: Array) -> Stream:
     """Return the readings in order of time, the first one of those with the same time."""
     ordered, first = np.unique(np.asarray(t_ns, np.int64), return_index=True)
-    return Stream(ordered, np.asarray(values, np.float64).reshape(-1, 3)[first])
+    columns = np.asarray(values, np.float64)
+    return Stream(ordered, (columns if columns.ndim == 2 else columns.reshape(-1, 3))[first])
 
 
 def no_readings() -> Stream:

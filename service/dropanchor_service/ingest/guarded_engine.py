@@ -26,6 +26,7 @@ from dropanchor_service.ingest.anchors import AnchorTable
 from dropanchor_service.ingest.decode import Decoded
 from dropanchor_service.ingest.references import PressureReferences
 from dropanchor_service.ingest.starts import StartWatch
+from dropanchor_service.ingest.told_heights import ToldHeights
 from dropanchor_service.ingest.units import convert, has_units
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
@@ -67,6 +68,7 @@ class GuardedEngine:
         self._sensors = SensorCheck()
         self._starts = StartWatch(engine, sites.rows.start_news)
         self._references = PressureReferences(engine)
+        self._heights = ToldHeights()
 
     @property
     def keeps_state(self) -> bool:
@@ -100,7 +102,7 @@ class GuardedEngine:
             current = self._current(row)
             unchanged = tag_columns(current.tag, current.declination_rad).tobytes() == known.tobytes()
             if unchanged and self._sites.of_row(row).index not in moved:
-                self._configured[row] = current
+                self._note(row, current)
                 self._starts.resume(row, current.tag)
                 self._references.resume(self._sites.of_row(row).index, row, current.tag)
         self._has_configured = np.zeros(len(settings), bool)
@@ -137,7 +139,7 @@ class GuardedEngine:
             if restart or (configured != current and _differ(configured, current)):
                 self._configure(tag.row)
             else:
-                self._configured[tag.row] = current
+                self._note(tag.row, current)
 
     def anchor_indices(self, rows: Array, numbers: Array) -> Array:
         """Return the engine's index for each anchor number that the tag of a row sent, -1 if its site lacks it."""
@@ -171,6 +173,7 @@ class GuardedEngine:
         for batch in self._bisected(checked.samples, now_ns) if any(map(len, checked.samples.columns())) else ():
             self._starts.look(batch)
             self._sensors.mark(batch.poses)
+            self._heights.mark(batch.poses)
             for column in (batch.poses, batch.innovations):
                 column["anchor"] = self.anchors.own_indices(column["anchor"])
             yield batch
@@ -237,8 +240,9 @@ class GuardedEngine:
 
     def _configure(self, row: int, start_known: bool = True) -> None:
         current, before = self._current(row), self._configured.get(row)
-        self._configured[row] = current
+        self._note(row, current)
         self._has_configured[row] = True
+        self._heights.begin(row, start_known)
         if start_known:
             self._starts.tell(row, current.tag, None if before is None else before.tag)
         else:
@@ -253,6 +257,10 @@ class GuardedEngine:
         site = self._sites.of_row(row).index
         others = (other for other in self._configured if other != row and self._sites.of_row(other).index == site)
         self._references.follow(site, row, tag, others)
+
+    def _note(self, row: int, current: _Configured) -> None:
+        self._configured[row] = current
+        self._heights.tell(row, current.tag)
 
     def _keep_settings(self, row: int, settings: Array) -> None:
         if row >= len(self._settings):

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dropanchor_schemas.kinds import SCALARS, Kind
+from dropanchor_schemas.kinds import PRESSURE, SCALARS, Kind
 from dropanchor_schemas.wire import MAX_T_NS, Reason
 from dropanchor_service.estimation.columns import Array, SampleBatch
 from dropanchor_service.ingest.backlog import Message
@@ -134,6 +134,8 @@ class SampleReader:
         samples, rejected = screen(batch.samples)
         if not {entry.reason for entry in rejected}.isdisjoint((Reason.IMU_ABSURD, Reason.RANGE_ABSURD)):
             self._note_absurd(batch._replace(rejected=rejected))
+        if any(entry.reason == Reason.PRESSURE_NOT_PA for entry in rejected):
+            self._note_low(batch)
         return batch._replace(samples=samples, rejected=rejected)
 
     def _note_absurd(self, batch: Batch) -> None:
@@ -142,6 +144,12 @@ class SampleReader:
         ranges = [entry.messages for entry in batch.rejected if entry.reason == Reason.RANGE_ABSURD]
         far = np.concatenate([np.empty(0, np.int64), *ranges])
         self._engine.note_absurd(batch.rows_of(imu), sizes, batch.messages.rows[far])
+
+    def _note_low(self, batch: Batch) -> None:
+        """Keep a pressure that is none in Pa for each tag, so that its hint can name the unit that it looks like."""
+        low = batch.samples.pressures[batch.samples.pressures["value"] < PRESSURE.limits[0]]
+        rows, values = batch.rows_of(low).tolist(), low["value"].tolist()
+        self._rows.low_pressures.update(zip(rows, values, strict=True))
 
     def _on_one_clock(self, batch: Batch) -> Batch:
         """Return the batch with the estimator's times, and restart the rows whose clock went back."""

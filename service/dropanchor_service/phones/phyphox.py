@@ -8,7 +8,7 @@ https://phyphox.org/wiki/index.php/Network_Connections, and the sources of phyph
 ExperimentTimeReference.java) and of phyphox-ios (the same names) for the names within `time`.
 
 Both platforms give the specific force, which at rest with the screen up is (0, 0, +9.81) m/s², rad/s and µT: on an
-iPhone, phyphox multiplies what the system reports by -9.81 (ExperimentSensorInput.swift).
+iPhone, phyphox multiplies what the system reports by -9.81 (ExperimentSensorInput.swift). Pressures are in hPa.
 """
 
 import json
@@ -17,11 +17,12 @@ from bisect import bisect_right
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from dropanchor_schemas.wire import MAX_T_NS
-from dropanchor_service.phones.phyphox_experiment import AXES, COLUMNS
+from dropanchor_schemas.wire import MAX_T_NS, PressureSample
+from dropanchor_service.phones.phyphox_experiment import AXES, COLUMNS, PRESSURE
 from dropanchor_tag_client.sources.phones.readings import PhoneError, is_measurement
 from dropanchor_tag_client.sources.phones.streams import Reading, Stream, make_stream
 
+_PA_PER_HPA = 100.0
 MAX_S = MAX_T_NS // 1_000_000_000
 NO_EXPERIMENT = "The message is not one of the experiment that this service makes for phyphox: load it again."
 
@@ -37,7 +38,7 @@ class Message(NamedTuple):
     streams: Mapping[str, Stream]
     damaged: int
     battery_fraction: None = None
-    pressures: tuple[()] = ()
+    pressures: tuple[PressureSample, ...] = ()
 
     @property
     def session_id(self) -> str:
@@ -54,7 +55,8 @@ def parse(body: bytes) -> Message | None:
     if not isinstance(message, dict) or not isinstance(message.get("time"), dict):
         raise PhoneError(NO_EXPERIMENT)
     columns = {name: [_column(message, f"{column}_{axis}") for axis in AXES] for name, column in COLUMNS.items()}
-    if not any(column for columns_of in columns.values() for column in columns_of):
+    air = [_column(message, name) for name in PRESSURE]
+    if not any(column for columns_of in (*columns.values(), air) for column in columns_of):
         return None
     starts = _starts(message["time"])
     streams, damaged = {}, 0
@@ -62,7 +64,8 @@ def parse(body: bytes) -> Message | None:
         streams[name], useless = _stream(columns_of, starts)
         damaged += useless
     used = {name: stream for name, stream in streams.items() if len(stream)}
-    return Message(_utc_ns(0.0, starts), used, damaged)
+    pressures, useless = _pressures(air, starts)
+    return Message(_utc_ns(0.0, starts), used, damaged + useless, pressures=pressures)
 
 
 def _column(message: dict[str, Any], name: str) -> list[Any]:
@@ -94,6 +97,16 @@ def _stream(columns: list[list[Any]], starts: list[_Start]) -> tuple[Stream, int
         if is_measurement(x, y, z) and 0.0 <= t_s < MAX_S:
             readings.append((_utc_ns(t_s, starts), (x, y, z)))
     return make_stream(readings), max(map(len, columns)) - len(readings)
+
+
+def _pressures(columns: list[list[Any]], starts: list[_Start]) -> tuple[tuple[PressureSample, ...], int]:
+    """Return the pressures, and how many make no sense."""
+    readings = tuple(
+        PressureSample(_utc_ns(t_s, starts), _PA_PER_HPA * hpa)
+        for t_s, hpa in zip(*(map(_number, column) for column in columns), strict=False)
+        if math.isfinite(hpa) and 0.0 <= t_s < MAX_S
+    )
+    return readings, max(map(len, columns)) - len(readings)
 
 
 def _utc_ns(experiment_s: float, starts: list[_Start]) -> int:

@@ -17,6 +17,9 @@ KEPT = 10 * RATE_HZ  # readings that the app holds; it sends and clears them in 
 COLUMNS = {TOTAL: "accelerometer", GYROSCOPE: "gyroscope", MAGNETOMETER: "magnetometer"}
 """What the columns of each sensor begin with."""
 AXES = ("t", "x", "y", "z")
+PRESSURE_HZ = 10
+PRESSURE = ("pressure_t", "pressure_x")
+"""Columns of the barometer: its times, and hPa."""
 USED = "used"
 _TYPES = {TOTAL: "accelerometer", GYROSCOPE: "gyroscope", MAGNETOMETER: "magnetic_field"}
 
@@ -57,6 +60,8 @@ def _add_containers(parent: Element) -> None:
     for column in COLUMNS.values():
         for axis in AXES:
             SubElement(parent, "container", size=str(KEPT)).text = f"{column}_{axis}"
+    for column in PRESSURE:
+        SubElement(parent, "container", size=str(10 * PRESSURE_HZ)).text = column
     SubElement(parent, "container", size="1").text = USED
 
 
@@ -68,6 +73,10 @@ def _add_sensors(parent: Element) -> None:
             sensor.set("ignoreUnavailable", "true")
         for axis in AXES:
             SubElement(sensor, "output", component=axis).text = f"{column}_{axis}"
+    barometer = SubElement(parent, "sensor", type="pressure", rate=str(PRESSURE_HZ), rateStrategy="request")
+    barometer.set("ignoreUnavailable", "true")
+    for column in PRESSURE:
+        SubElement(barometer, "output", component=column[-1]).text = column
 
 
 def _add_view(parent: Element, tag: str) -> None:
@@ -89,8 +98,6 @@ def _add_connection(parent: Element, address: str) -> None:
         interval=str(INTERVAL_S),
     )
     SubElement(connection, "send", id="time", type="time")
-    for column in COLUMNS.values():
-        for axis in AXES:
-            sent = SubElement(connection, "send", id=f"{column}_{axis}", keep="false")
-            sent.text = f"{column}_{axis}"
+    for column in (*(f"{sensor}_{axis}" for sensor in COLUMNS.values() for axis in AXES), *PRESSURE):
+        SubElement(connection, "send", id=column, keep="false").text = column
     SubElement(connection, "receive", id="samples", append="false").text = USED

@@ -14,6 +14,7 @@ from dropanchor_service.answers.pose_fields import height_source_values
 from dropanchor_service.estimation.columns import Array, Frame
 from dropanchor_service.history.records import ESTIMATED
 from dropanchor_service.recording import schemas
+from dropanchor_service.store.floors import is_height_known
 from dropanchor_service.store.site import SiteDocument
 
 FRAME = "site"
@@ -103,7 +104,7 @@ def _location(pose: Array, document: SiteDocument) -> dict[str, object]:
     assert origin is not None
     lat, lon = lat_lon(origin, pose["x"], pose["y"])
     alt_m = altitude(origin, pose["z"])
-    has_altitude = alt_m is not None and math.isfinite(alt_m + pose["z_std"])
+    has_altitude = alt_m is not None and bool(is_height_known(pose[None])[0])
     angle = origin.rotation_rad
     enu_from_site = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     covariance = np.diag([0.0, 0.0, pose["z_std"] ** 2 if has_altitude else UNKNOWN_VARIANCE])

@@ -30,18 +30,17 @@ class Floors:
         count = len(poses)
         found, probability = np.full(count, -1, np.int64), np.full(count, np.nan)
         if self.names:
-            z, std = (np.ascontiguousarray(poses[name], np.float64) for name in ("z", "z_std"))
-            z[~is_height_known(poses)] = np.nan
+            z = np.where(is_height_known(poses), poses["z"], np.nan)
+            std = np.ascontiguousarray(poses["z_std"], np.float64)
             room = np.zeros(len(self.names))
             find_floors(z, std, self.bottom, self.top, self.number, room, found, probability)
         return found, probability
 
 
 def is_height_known(poses: Array) -> Array:
-    """Return whether the height of each POSE or POINT says something. 0 m is what a tag has that nobody told one."""
-    known: Array = np.isfinite(poses["z"] + poses["z_std"])
-    untold: Array = (poses["z_source"] == HeightSource.TOLD) & (poses["z"] == 0.0)
-    return known & ~untold
+    """Return whether the height of each POSE or POINT is one in the frame of the site."""
+    known: Array = np.isfinite(poses["z"] + poses["z_std"]) & (poses["z_source"] != HeightSource.START)
+    return known
 
 
 def floors_of(floors: Iterable[Floor | None]) -> Floors:

@@ -104,6 +104,7 @@ class Rows:
         self.findings = SensorFindings()
         self.start_news = StartNewsQueue()
         self.wrong_times = WrongTimes()
+        self.low_pressures: dict[int, float] = {}  # by row: the last one below what a barometer shows in Pa, as sent
         self.recent = Recent(COUNTS)
         self.online_until = OnlineUntil()
 

@@ -1,4 +1,4 @@
-"""Simulated tags that change floors, and a door that slams: is the floor right, and is a wrong one believed?"""
+"""Simulated tags that change floors, doors that slam, and the sun: is the floor right, is a wrong one believed?"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -29,6 +29,14 @@ def slammed(run: TagRun, at_s: float = 30.0) -> TagRun:
     pressures = run.samples.pressures.copy()
     t = pressures["t_ns"] / NS_PER_S
     pressures["pressure"][(t >= at_s) & (t < at_s + 1.0)] += 200.0
+    return replace(run, samples=replace(run.samples, pressures=pressures))
+
+
+def warmed(run: TagRun, pa_per_k: float, kelvin: float, at_s: float = 10.0, tau_s: float = 60.0) -> TagRun:
+    """Return the run with a barometer that comes into the sun, and shows its own warmth as a change of pressure."""
+    pressures = run.samples.pressures.copy()
+    t = pressures["t_ns"] / NS_PER_S
+    pressures["pressure"] += pa_per_k * kelvin * (1.0 - np.exp(-np.maximum(t - at_s, 0.0) / tau_s))
     return replace(run, samples=replace(run.samples, pressures=pressures))
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from dropanchor_schemas.wire import ENCODING_JSON, Frame, ImuSample, RangeSample, decode_packed
+from dropanchor_schemas.wire import ENCODING_JSON, Frame, ImuSample, PressureSample, RangeSample, decode_packed
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_tag_client.simulator.live import tag_name
@@ -88,11 +88,27 @@ def in_millimetres(frame: Frame, _: float) -> Frame:
     return range_frame(frame, lambda sample: sample._replace(range_m=4000.0 + 1000.0 * sample.range_m))
 
 
-FAULTS = {
+def with_pressure(frame: Frame, value: float) -> Frame:
+    return frame.replaced(pressures=[PressureSample(frame.times()[0], value)])
+
+
+FAULTS: dict[str, tuple[Fault, str]] = {
     "same times": (same_times, "N of its last N IMU samples were not used: several have the same time"),
     "all zero": (all_zero, "Its last N ranges are all N: the radio measures no distance"),
     "frozen": (frozen, "N of its last N IMU samples were not used: they are equal to the last bit"),
     "stuck radio": (stuck_radio, "N of its last N ranges were not used: they are equal although the tag moves"),
+    "hPa": (
+        lambda frame, _: with_pressure(frame, 1_013.25),
+        "N of its last N pressures were not used: they look like hPa, so multiply them by N",
+    ),
+    "kPa": (
+        lambda frame, _: with_pressure(frame, 101.325),
+        "N of its last N pressures were not used: they look like kPa, so multiply them by N",
+    ),
+    "inHg": (
+        lambda frame, _: with_pressure(frame, 29.92),
+        "N of its last N pressures were not used: no air has so low a pressure, so send Pa",
+    ),
     "millimetres": (in_millimetres, "The ranges look like millimetres: divide them by N"),
 }
 

@@ -6,6 +6,7 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 from dropanchor_schemas.plans import Floor
+from dropanchor_service.estimation.columns import HeightSource
 from service.dashboard.plan_place import PlanPlace, plan_place
 from service.dashboard.test_plans_in_browser import edit, open_panel
 from support.browser import watched_page
@@ -29,7 +30,7 @@ def place() -> Iterator[PlanPlace]:
     with plan_place() as made:
         made.move("low", x=1.0, y=1.0, z=1.2, z_std=0.15)
         made.move("high", x=-1.0, y=1.0, z=4.5, z_std=0.15)
-        made.move("unset", x=0.0, y=-1.0, z=0.0, z_std=0.15)
+        made.move("unset", x=0.0, y=-1.0, z=0.0, z_std=0.15, z_source=HeightSource.START)
         made.put("ground", image_file(), floor=GROUND)
         yield made
 

@@ -1,6 +1,7 @@
 """The settings of a tag on the page: name, colour, group, motion, angle, height, start; and its deletion."""
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,7 @@ def open_settings(page: WatchedPage, tag: str) -> Locator:
     with page.page.expect_response(lambda response: f"/{tag}/settings" in response.url):
         page.page.locator("#detail summary").click()
     form = page.page.get_by_role("form", name="Settings of the tag")
-    expect(form.get_by_label("Height")).not_to_have_value("")
+    expect(form.get_by_label("Height")).to_have_attribute("data-shown", re.compile(r"^.*$"))
     return form
 
 
@@ -73,7 +74,20 @@ def test_motion_mounting_angle_and_height_are_saved_and_undone(chromium: Browser
         outcome.get_by_role("button", name="Undo").click()
         expect(outcome).to_contain_text("Undone")
         assert place.bench.answers.site.tag_settings("cart") == TagSettings()
-        expect(form.get_by_label("Height")).to_have_value("0")
+        expect(form.get_by_label("Height")).to_have_value("")
+
+
+def test_a_height_of_0_is_told_and_an_empty_one_is_not(chromium: Browser, place: Place) -> None:
+    place.move("cart", x=1.0, y=1.0)
+    store = place.bench.answers.site
+    with watched_page(chromium, place.url) as page:
+        form = open_settings(page, "cart")
+        expect(form.get_by_label("Height")).to_have_value("")
+        for typed, told in (("0", TagSettings(height_told=True)), ("", TagSettings())):
+            form.get_by_label("Height").fill(typed)
+            form.get_by_role("button", name="Save settings").click()
+            wait_until(lambda told=told: store.tag_settings("cart") == told)  # type: ignore[misc]
+            expect(form.get_by_label("Height")).to_have_value(typed)
 
 
 def test_settings_that_another_page_changed_meanwhile_are_merged_only_when_asked(

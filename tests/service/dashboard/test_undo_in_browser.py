@@ -197,7 +197,7 @@ def test_rules_destinations_tags_and_anchors_are_undone(chromium: Browser, yard:
         page.locator("tr[data-tag='cart']").click()
         page.locator("#detail summary").click()
         settings = page.get_by_role("form", name="Settings of the tag")
-        expect(settings.get_by_label("Height")).not_to_have_value("")
+        expect(settings.get_by_label("Height")).to_have_attribute("data-shown", "")
         settings.get_by_label("Name").fill("Forklift 1")
         settings.get_by_label("Group").fill("forklifts")
         settings.get_by_label("Group").press("Enter")

@@ -22,6 +22,7 @@ from dropanchor_tag_client.simulator.sensors import preset
 from dropanchor_tag_client.simulator.simulation import simulate
 
 T0_NS = 1_760_000_000_000_000_000
+PRESSURE_HPA = 987.25
 G_MPS2 = 9.80665
 VECTORS = (("ax", "ay", "az"), ("gx", "gy", "gz"), ("mx", "my", "mz"))
 
@@ -96,6 +97,10 @@ def sensor_logger(path: Path, recording: Recording, ios: bool = False, platform:
         )
         for name, vectors in sensors.items()
     }
+    files["Barometer.csv"] = text(
+        ("time", "seconds_elapsed", "relativeAltitude", "pressure"),
+        [(t, (t - T0_NS) / 1e9, 0.0, PRESSURE_HPA) for t in t_ns[::10]],
+    )
     files["Location.csv"] = "time,seconds_elapsed,latitude,longitude\n1,0.1,52.5,13.4\n"
     if platform:
         files["Metadata.csv"] = f"version,device name,platform,standardisation\n3,Phone,{platform},false\n"
@@ -118,6 +123,11 @@ def phyphox(folder: Path, recording: Recording, separator: str = ",", comma: boo
             cells = [f"{value:.15E}" for value in (t_s, *vector, 0.0)]
             lines.append(separator.join(cell.replace(".", ",") if comma else cell for cell in cells))
         (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    lines = [separator.join(('"Time (s)"', '"Pressure (hPa)"'))]
+    for t_s in recording.imu["t_s"][::10]:
+        cells = [f"{value:.15E}" for value in (t_s, PRESSURE_HPA)]
+        lines.append(separator.join(cell.replace(".", ",") if comma else cell for cell in cells))
+    (folder / "Pressure.csv").write_text("\n".join(lines) + "\n")
     times = f'"START",0.000000000E0,{T0_NS / 1e9:.3f},"then"\n"PAUSE",1E3,{T0_NS / 1e9 + 1e3:.3f},"later"\n'
     (folder / "meta" / "time.csv").write_text(f'"event","experiment time","system time","system time text"\n{times}')
     (folder / "meta" / "device.csv").write_text('"property","value"\n"deviceModel","x"\n')
@@ -169,6 +179,10 @@ class Messages:
             magnetic_field=self.vector([value / 1e6 for value in micro_tesla]),
             magnetic_field_covariance=np.zeros(9),
         )
+
+    def pressure(self, t_ns: int, pascal: float) -> Any:
+        kind = "sensor_msgs/msg/FluidPressure"
+        return self.make(kind, header=self.header(t_ns), fluid_pressure=pascal, variance=4.0)
 
     def range(self, t_ns: int, range_m: float, std_m: float = 0.0) -> Any:
         names = {field[0] for field in self.store.fielddefs["sensor_msgs/msg/Range"][1]}

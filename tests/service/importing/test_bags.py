@@ -18,6 +18,7 @@ from dropanchor_schemas.wire import (
     Frame,
     HeadingSample,
     ImuSample,
+    PressureSample,
     RangeSample,
     anchor_number,
     encode_json,
@@ -244,6 +245,7 @@ def frame(i: int, boot_clock: bool = False) -> Frame:
         imu=[ImuSample(t_ns, (0.0, 0.0, 9.75), (0.0, 0.0, 0.5), (20.0, 0.0, -40.0))],
         ranges=[RangeSample(t_ns, anchor_number("gate"), 5.0 + i, 0.125)],
         headings=[HeadingSample(t_ns, 0.5, float("nan"))],
+        pressures=[PressureSample(t_ns, 101_325.0 - 12.5 * i, 21.5 if i else float("nan"))],
         sequence=i,
         boot_id=9,
         boot_clock=boot_clock,
@@ -263,6 +265,8 @@ def test_a_recording_of_the_service_gives_the_samples_of_a_tag_and_the_anchors(r
     assert ended.rows("anchors") == [{"id": "gate", "x": "1.0", "y": "2.0", "z": "3.0"}]
     assert ended.column("imu", "az") == [9.75] * 3
     assert ended.column("heading", "yaw_rad") == [0.5] * 3
+    assert ended.column("pressure", "pressure_pa") == [101_325.0, 101_312.5, 101_300.0]
+    assert [row["temperature_c"] for row in ended.rows("pressure")] == ["", "21.5", "21.5"]
 
 
 def test_a_clock_since_boot_is_set_by_the_arrival(run: Import) -> None:

@@ -55,6 +55,15 @@ def test_an_export_of_phyphox_without_its_times_counts_from_the_start(run: Impor
     assert "its times count from the start of the experiment" in run(export).printed
 
 
+def test_the_barometer_of_a_phone_is_a_pressure_in_pa(run: Import, drive: Recording) -> None:
+    phyphox = run(formats.phyphox(run.folder / "export", drive, ";", comma=True))
+    logger = run(formats.sensor_logger(run.folder / "phone.zip", drive, platform="android"), out="logger")
+    for ended in (phyphox, logger):
+        assert ended.column("pressure", "pressure_pa") == pytest.approx([100.0 * formats.PRESSURE_HPA] * 20)
+        assert ended.column("pressure", "t_s") == pytest.approx(list(drive.imu["t_s"][::10]), abs=1e-9)
+        assert "98725 to 98725 Pa" in ended.printed
+
+
 @pytest.mark.parametrize("platform", [None, "ios"])
 def test_an_iphone_has_its_accelerations_turned_round(run: Import, drive: Recording, platform: str | None) -> None:
     ended = run(formats.sensor_logger(run.folder / "phone.zip", drive, ios=True, platform=platform))

@@ -166,3 +166,20 @@ def test_an_experiment_that_has_not_begun_or_pauses_sends_nothing_and_is_welcome
     for body in (message([], START_S, {}), message(START, START_S, at_rest())):
         assert phone.post(body) == 0
     assert not phone.counted
+
+
+def test_a_barometer_is_passed_on_in_pascals_once_and_what_is_no_number_is_damaged() -> None:
+    phone = make_phone()
+    content = json.loads(message(START, START_S + 1, at_rest(0.1, 0.11)))
+    body = json.dumps(content | {"pressure_t": [0.05, 0.15, 0.25], "pressure_x": [1013.25, None, 1013.5]}).encode()
+    outcomes = [phone.intake.post("anna", body) for _ in range(2)]
+    assert [one.damaged for one in outcomes] == [1, 1]
+    pressures = [sample[:2] for frame in phone.frames for sample in frame.pressures]
+    assert pressures == [(START_NS + 50_000_000, 101_325.0), (START_NS + 250_000_000, 101_350.0)]
+
+
+def test_a_message_of_the_barometer_alone_is_used() -> None:
+    phone = make_phone()
+    content = json.loads(message(START, START_S + 1, {}))
+    phone.post(json.dumps(content | {"pressure_t": [0.05], "pressure_x": [1013.25]}).encode())
+    assert [sample.pressure_pa for frame in phone.frames for sample in frame.pressures] == [101_325.0]

@@ -47,7 +47,7 @@ def test_the_probability_is_that_of_a_gaussian_between_the_ends_of_the_floor(z: 
         (9.0, 0.3, HeightSource.PRESSURE),  # above the house
         (3.0, 10.0, HeightSource.UNKNOWN),  # more likely on none
         (math.nan, math.nan, HeightSource.TOLD),
-        (0.0, 0.15, HeightSource.TOLD),  # nobody told a height
+        (1.0, 0.15, HeightSource.START),  # nobody told the height of the start
     ],
     ids=["elsewhere", "wide", "unknown", "untold"],
 )
@@ -56,8 +56,15 @@ def test_no_floor_is_named_where_none_is_likely(z: float, std: float, source: He
     assert (name, math.isnan(probability)) == (None, True)
 
 
+def test_looking_for_a_floor_leaves_the_pose_as_it_is() -> None:
+    one = poses(1.0, 0.15, HeightSource.START)
+    HOUSE.likeliest(one)
+    assert one["z"].tolist() == [1.0]
+
+
 def test_a_told_height_has_a_floor_and_an_exact_one_belongs_to_the_floor_above() -> None:
     assert floor(1.2, 0.15, HeightSource.TOLD)[0] == "Ground"
+    assert floor(0.0, 0.0, HeightSource.TOLD)[0] == "Ground"
     assert floor(3.0, 0.0) == ("1st", 1.0)
 
 

@@ -80,7 +80,9 @@ def test_a_zone_of_a_floor_takes_the_tags_whose_height_is_there() -> None:
     assert bench.stay(2.0, "a", x=30.0, z=4.0, **height) == ["zone.exit a"]
 
 
-@pytest.mark.parametrize("unknown", [{"z": math.nan}, {"z": 0.0, "z_std": 0.15}], ids=["unknown", "untold"])
+@pytest.mark.parametrize(
+    "unknown", [{"z": math.nan}, {"z": 1.0, "z_std": 0.15, "z_source": HeightSource.START}], ids=["unknown", "untold"]
+)
 def test_a_tag_whose_height_is_not_known_enters_no_zone_with_heights_and_may_leave_it(
     unknown: dict[str, float],
 ) -> None:

@@ -1,10 +1,9 @@
-"""Pages of a track as JSON, GeoJSON, CSV or GPX."""
+"""Pages of a track as JSON, GeoJSON, CSV, GPX or KML."""
 
 import csv
 import io
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from datetime import UTC, datetime
 from typing import Any
 from xml.sax.saxutils import escape
 
@@ -12,15 +11,20 @@ from fastapi import Request
 
 from dropanchor_service.answers.answers import to_json
 from dropanchor_service.answers.track_pages import TrackPage
-from dropanchor_service.api.formats import geojson
+from dropanchor_service.api.formats import geojson, kml
+from dropanchor_service.api.formats.placed import is_apart, placed, utc
 from dropanchor_service.api.http.errors import Kind, ProblemError
 
-JSON, GEOJSON, CSV, GPX = "json", "geojson", "csv", "gpx"
-MEDIA_TYPES = {JSON: "application/json", GEOJSON: "application/geo+json", CSV: "text/csv", GPX: "application/gpx+xml"}
-GEOREFERENCED = {GEOJSON: "GeoJSON", GPX: "GPX"}
-GAP_NS = 10_000_000_000  # a longer gap starts a new segment of a GPX track
+JSON, GEOJSON, CSV, GPX, KML = "json", "geojson", "csv", "gpx", "kml"
+MEDIA_TYPES = {
+    JSON: "application/json",
+    GEOJSON: "application/geo+json",
+    CSV: "text/csv",
+    GPX: "application/gpx+xml",
+    KML: "application/vnd.google-earth.kml+xml",
+}
+GEOREFERENCED = {GEOJSON: "GeoJSON", GPX: "GPX", KML: "KML"}
 
-_PLACED = ("tracking", "coasting", "degraded")
 NESTED = ("covariance", "relative_pose")
 COVARIANCES = {"var_x": (0, 0), "cov_xy": (0, 1), "cov_xh": (0, 2), "var_y": (1, 1), "cov_yh": (1, 2), "var_h": (2, 2)}
 _OF_RELATIVE = ("x", "y", "heading_rad", "p_mode", "sigma_pos_m")
@@ -116,7 +120,7 @@ def _gpx(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:
     yield f"<trk><name>{escape(head['tag'])}</name><trkseg>\n".encode()
     last_ns = None
     for page in pages:
-        points = [pose for pose in page.rows() if pose["state"] in _PLACED and math.isfinite(pose["lat"])]
+        points = placed(page)
         times = [last_ns, *(pose["t_ns"] for pose in points)]
         yield "".join(map(_gpx_point, points, times)).encode()
         last_ns = times[-1]
@@ -125,15 +129,9 @@ def _gpx(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:
 
 def _gpx_point(pose: dict[str, Any], last_ns: int | None) -> str:
     """Return a point, in a new segment if it comes long after the one of `last_ns`."""
-    apart = last_ns is not None and pose["t_ns"] - last_ns > GAP_NS
     elevation = f"<ele>{pose['alt_m']:.3f}</ele>" if geojson.is_known(pose.get("alt_m")) else ""
-    point = f'<trkpt lat="{pose["lat"]:.9f}" lon="{pose["lon"]:.9f}">{elevation}<time>{_utc(pose["t_ns"])}</time>'
-    return ("</trkseg><trkseg>\n" if apart else "") + f"{point}<type>{pose['state']}</type></trkpt>\n"
-
-
-def _utc(t_ns: int) -> str:
-    seconds, rest = divmod(t_ns, 1_000_000_000)
-    return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{rest // 1_000_000:03d}Z"
+    point = f'<trkpt lat="{pose["lat"]:.9f}" lon="{pose["lon"]:.9f}">{elevation}<time>{utc(pose["t_ns"])}</time>'
+    return ("</trkseg><trkseg>\n" if is_apart(pose, last_ns) else "") + f"{point}<type>{pose['state']}</type></trkpt>\n"
 
 
 _WRITERS: Mapping[str, Callable[[Iterable[TrackPage], Head], Iterator[bytes]]] = {
@@ -141,4 +139,5 @@ _WRITERS: Mapping[str, Callable[[Iterable[TrackPage], Head], Iterator[bytes]]] =
     GEOJSON: _geojson,
     CSV: _csv,
     GPX: _gpx,
+    KML: kml.stream,
 }

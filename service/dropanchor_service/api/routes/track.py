@@ -33,8 +33,8 @@ _PARQUET_IS_A_FILE = say(
 _DESCRIPTION = """\
 The stored poses of a tag in order of time. The settings of the service say how many poses it stores. It writes them
 about two seconds after they are computed. A page holds up to `limit` poses. `next`, and the header `Link` with
-rel="next", lead to the next page. GeoJSON and GPX need a georeferenced site. GPX holds only poses that are `tracking`,
-`coasting` or `degraded`, and gives the state in `type`."""
+rel="next", lead to the next page. GeoJSON, GPX and KML need a georeferenced site. GPX and KML hold only poses
+that are `tracking`, `coasting` or `degraded`."""
 
 
 class TrackQuery(Period):
@@ -42,7 +42,7 @@ class TrackQuery(Period):
 
     limit: int = Field(default=1000, ge=1, le=MAX_POSES, description="The maximum number of poses on a page.")
     cursor: int | None = Field(default=None, ge=0, lt=2**62, description="The value of `next` on the previous page.")
-    format: Literal["json", "geojson", "csv", "gpx"] | None = Field(
+    format: Literal["json", "geojson", "csv", "gpx", "kml"] | None = Field(
         default=None, description="The format of the response. The default depends on the header `Accept`."
     )
 
@@ -60,6 +60,7 @@ CONTENT: dict[str, Any] = {
     track_formats.MEDIA_TYPES[track_formats.GEOJSON]: {"schema": schema_of(TrackFeatureCollection)},
     track_formats.MEDIA_TYPES[track_formats.CSV]: TEXT,
     track_formats.MEDIA_TYPES[track_formats.GPX]: TEXT,
+    track_formats.MEDIA_TYPES[track_formats.KML]: TEXT,
 }
 """The media types of a track in the OpenAPI document."""
 

@@ -26,8 +26,8 @@ PARQUET = "parquet"
 MEDIA_TYPES = track_formats.MEDIA_TYPES | {PARQUET: "application/vnd.apache.parquet"}
 
 _DESCRIPTION = """\
-Every stored pose of a tag over a period, in one file. GeoJSON and GPX need a georeferenced site. GPX holds only poses
-in the frame of the site that are `tracking`, `coasting` or `degraded`, and gives the state in `type`. Parquet needs the
+Every stored pose of a tag over a period, in one file. GeoJSON, GPX and KML need a georeferenced site. GPX and KML hold
+only poses in the frame of the site that are `tracking`, `coasting` or `degraded`. Parquet needs the
 extra `parquet` of the service; its schema holds the units and the frame. A pose whose state is `relative` has no place
 in the site: CSV and Parquet have that in the tag's own frame in the columns `relative_…`."""
 
@@ -35,7 +35,7 @@ in the site: CSV and Parquet have that in the tag's own frame in the columns `re
 class FileQuery(Period):
     """The period to export, and the format of the file."""
 
-    format: Literal["csv", "geojson", "gpx", "json", "parquet"] = Field(
+    format: Literal["csv", "geojson", "gpx", "json", "kml", "parquet"] = Field(
         default="csv", description="The format of the file."
     )
 

@@ -124,6 +124,7 @@ export function height(z_m, std_m, source) {
   if (!known(z_m) || !known(std_m) || !source) return UNKNOWN;
   if (source === "unknown") return t("figure.height_unknown");
   if (source === "told") return t("figure.height_told", { height: length(z_m) });
+  if (source === "start") return t("figure.height_start", { height: length(z_m), error: length(std_m) });
   return t("figure.height_pressure", { height: length(z_m), error: length(std_m) });
 }
 

@@ -8,7 +8,7 @@ import { saveFile } from "../data/save_file.js";
 import { nanoseconds } from "../data/track_reader.js";
 import { isSi } from "../data/units.js";
 
-const GEOREFERENCED = ["geojson", "gpx"];
+const GEOREFERENCED = ["geojson", "gpx", "kml"];
 
 export class PastFigures {
   isGeoreferenced = false;

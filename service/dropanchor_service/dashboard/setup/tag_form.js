@@ -31,7 +31,7 @@ export function fillForm(form, settings, groups) {
     mount: angle === null ? "" : String(Math.round(angle * DEGREES * 10) / 10),
   };
   for (const [name, text] of Object.entries(texts)) field(form, name).value = field(form, name).dataset.shown = text;
-  writeMeasure(field(form, "height"), settings.height_m);
+  writeMeasure(field(form, "height"), (settings.height_told ?? settings.height_m !== 0) ? settings.height_m : null);
   form.querySelector("datalist")?.replaceChildren(...[...groups].sort().map((group) => new Option(group)));
 }
 
@@ -47,13 +47,15 @@ export function typedIn(form) {
 /** Return the settings that a person has changed. @param {HTMLFormElement} form */
 export function patchOf(form) {
   const angle = numberOf(field(form, "mount"));
+  const height_m = readMeasure(field(form, "height"));
   const values = [
     ["name", "name", field(form, "name").value.trim()],
     ["group", "group", field(form, "group").value.trim()],
     ["colour", "colour", field(form, "colour").value || null],
     ["motion", "motion", field(form, "motion").value],
     ["mount", "mount_angle_rad", angle === null ? null : angle / DEGREES],
-    ["height", "height_m", readMeasure(field(form, "height")) ?? 0],
+    ["height", "height_m", height_m ?? 0],
+    ["height", "height_told", height_m === 0 ? true : null], // 0 is also what a tag has that nobody told one
   ];
   return Object.fromEntries(values.filter(([name]) => isTyped(field(form, String(name)))).map(([, key, value]) => [key, value]));
 }

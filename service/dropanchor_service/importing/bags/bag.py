@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, Protocol
 
 NS_PER_S = 1_000_000_000
 IMU, MAG, RANGE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/MagneticField", "sensor_msgs/msg/Range"
+PRESSURE = "sensor_msgs/msg/FluidPressure"
 
 
 @dataclass(frozen=True)

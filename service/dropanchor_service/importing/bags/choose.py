@@ -1,9 +1,9 @@
-"""Which topics of a bag hold the IMU, the magnetometer and the ranges."""
+"""Which topics of a bag hold the IMU, the magnetometer, the barometer and the ranges."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
-from dropanchor_service.importing.bags.bag import IMU, MAG, RANGE, Bag, Message, Topic
+from dropanchor_service.importing.bags.bag import IMU, MAG, PRESSURE, RANGE, Bag, Message, Topic
 from dropanchor_service.importing.bags.topic_table import TopicTable, columns_of
 from dropanchor_service.importing.readings import ImportingError
 from dropanchor_service.importing.tables.guess import guessed
@@ -12,7 +12,7 @@ from dropanchor_tag_client.command_line import did_you_mean
 
 _SAMPLE = 5
 _SEARCH = 100_000  # messages that are read to see what topics hold
-_KNOWN = {IMU: "imu", MAG: "mag", RANGE: "range"}
+_KNOWN = {IMU: "imu", MAG: "mag", RANGE: "range", PRESSURE: "pressure"}
 _NO_SENSORS: tuple[str, ...] = ("sensor_msgs/", "nav_msgs/", "geometry_msgs/", "tf2_msgs/", "tf/", "std_msgs/")
 _NO_SENSORS += (
     "rosgraph_msgs/",
@@ -26,16 +26,17 @@ _NO_SENSORS += (
 
 @dataclass
 class Chosen:
-    """imu, mag: topics, None for none. ranges: topics, each with its anchor, None if the messages name it."""
+    """imu, mag, pressure: topics, None for none. ranges: topics, each with its anchor, None if the messages name it."""
 
     imu: str | None = None
     mag: str | None = None
     ranges: list[tuple[str, str | None]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    pressure: str | None = None
 
     @property
     def all(self) -> list[str]:
-        return [name for name in (self.imu, self.mag) if name] + [topic for topic, _ in self.ranges]
+        return [name for name in (self.imu, self.mag, self.pressure) if name] + [topic for topic, _ in self.ranges]
 
 
 def tables_of(bag: Bag, names: Collection[str], path: object) -> dict[str, TopicTable]:
@@ -56,7 +57,7 @@ def tables_of(bag: Bag, names: Collection[str], path: object) -> dict[str, Topic
 def choose(bag: Bag, told: Chosen, path: object) -> Chosen:
     """Return the told topics, and where none is told the only one that fits. Raises ImportingError."""
     roles = _roles(bag)
-    by_role = {role: [name for name, found in roles.items() if found == role] for role in ("imu", "mag", "range")}
+    by_role = {role: [name for name, found in roles.items() if found == role] for role in _KNOWN.values()}
     chosen = Chosen(told.imu, told.mag, list(told.ranges))
     if chosen.imu is None:
         chosen.imu = _only(by_role["imu"], "IMU topics: say which with --imu TOPIC", bag, path)
@@ -67,6 +68,11 @@ def choose(bag: Bag, told: Chosen, path: object) -> Chosen:
         chosen.mag = by_role["mag"][0]
     elif chosen.mag is None and by_role["mag"]:
         chosen.notes.append(f"not used: {', '.join(by_role['mag'])} (--mag TOPIC chooses a magnetometer)")
+    if len(by_role["pressure"]) == 1:
+        chosen.pressure = by_role["pressure"][0]
+        chosen.notes.append(f"pressures from {chosen.pressure}")
+    elif by_role["pressure"]:
+        chosen.notes.append(f"not used: {', '.join(by_role['pressure'])} (several barometers)")
     if not chosen.all:
         raise ImportingError(
             f"{path} has no topic that is known as an IMU or as ranges. Choose with --imu TOPIC and --range "

@@ -123,8 +123,11 @@ def _fill(readings: Readings, frames: Sequence[Frame], source: str, names: dict[
     readings.headings = headings_of(
         _times(headings), np.array([h.heading_rad for h in headings]), np.array([h.std_rad for h in headings])
     )
-    for field, why in (("bearings", "bearings: a recording folder has none"), ("pressures", "pressures: not imported")):
-        readings.left_out.add(source, why, count=sum(len(getattr(frame, field)) for frame in frames))
+    pressures = [sample for frame in frames for sample in frame.pressures]
+    air = np.array([(sample.pressure_pa, sample.temperature_c) for sample in pressures]).reshape(-1, 2)
+    readings.pressure = stream_of(_times(pressures), air, source, "pressures", readings.left_out)
+    count = sum(len(frame.bearings) for frame in frames)
+    readings.left_out.add(source, "bearings: a recording folder has none", count=count)
 
 
 def _times(samples: Sequence[object]) -> Array:

@@ -72,15 +72,16 @@ def _fields(table: TopicTable, choice: Choice, chosen: Chosen) -> dict[str, Colu
 
 def _wanted(topic: str, chosen: Chosen) -> "_Wanted":
     ranges = any(name == topic for name, _ in chosen.ranges)
-    return _Wanted(topic == chosen.imu, chosen.mag in (topic, None), ranges)
+    return _Wanted(topic == chosen.imu, chosen.mag in (topic, None), ranges, topic == chosen.pressure)
 
 
 class _Wanted:
     """The fields that a topic is read for."""
 
-    def __init__(self, imu: bool, mag: bool, ranges: bool) -> None:
+    def __init__(self, imu: bool, mag: bool, ranges: bool, pressure: bool) -> None:
         self._names = (_IMU_FIELDS if imu else set()) | (_RANGE_FIELDS if ranges else set())
         self._names |= {T, T_NSEC, *VECTORS["mag"]} if mag else set()
+        self._names |= {T, T_NSEC, *VECTORS["pressure"]} if pressure else set()
         self._wide = ranges
 
     def __contains__(self, name: str) -> bool:
@@ -99,7 +100,7 @@ def _with_units(fields: Mapping[str, Column], kind: str) -> dict[str, Column]:
     if not kind.startswith("sensor_msgs/"):
         return dict(fields)
     units = dict.fromkeys(VECTORS["acc"], "m/s2") | dict.fromkeys(VECTORS["gyro"], "rad/s")
-    units |= dict.fromkeys(VECTORS["mag"], "T" if kind == MAG else "uT") | {"range": "m", "std": "m"}
+    units |= dict.fromkeys(VECTORS["mag"], "T" if kind == MAG else "uT") | {"range": "m", "std": "m", "pressure": "Pa"}
     return {
         name: column if column.unit or name in (T, ANCHOR) else Column(column.name, units.get(name, "m"), column.sign)
         for name, column in fields.items()

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dropanchor_service.importing.bags.bag import IMU, MAG, NS_PER_S, RANGE, Bag, Message
+from dropanchor_service.importing.bags.bag import IMU, MAG, NS_PER_S, PRESSURE, RANGE, Bag, Message
 from dropanchor_service.importing.progress import shown
 from dropanchor_service.importing.readings import LeftOut
 from dropanchor_service.importing.tables.flat import Flat, flat_rows
@@ -23,6 +23,7 @@ _READINGS = {
     IMU: (STAMP, "linear_acceleration.", "angular_velocity."),
     MAG: (STAMP, "magnetic_field."),
     RANGE: (STAMP, STD, "range"),
+    PRESSURE: (STAMP, "fluid_pressure"),
 }
 
 

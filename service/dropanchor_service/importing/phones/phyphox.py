@@ -1,6 +1,7 @@
 """Exports of the app phyphox: a folder or zip with one CSV for each sensor, or one CSV with all of them.
 
-The first column is "Time (s)", the others are "Acceleration x (m/s^2)", "Gyroscope x (rad/s)", "Magnetic field x (µT)".
+The first column is "Time (s)", the others are "Acceleration x (m/s^2)", "Gyroscope x (rad/s)", "Magnetic field x (µT)",
+"Pressure (hPa)".
 meta/time.csv has the times at which the experiment began and paused. https://phyphox.org/wiki/index.php/Data_export
 Both platforms give the specific force in the same axes; see `dropanchor_service.phones.phyphox`.
 """
@@ -15,7 +16,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.files import File
 from dropanchor_service.importing.phones.phone import imu_readings
 from dropanchor_service.importing.readings import ImportingError, LeftOut, Readings, stream_of
-from dropanchor_service.importing.streams import Stream
+from dropanchor_service.importing.streams import Stream, no_readings
 from dropanchor_service.importing.tables.table import number
 from dropanchor_service.importing.tables.text_table import TextTable, read_table
 from dropanchor_tag_client.sources.phones.pairing import Signs
@@ -30,6 +31,7 @@ _SENSORS = {
     ("magnetic field", "µt"): MAGNETOMETER,
     ("magnetic field", "μt"): MAGNETOMETER,
 }
+_PRESSURES = {"pressure (hpa)": 100.0, "pressure (kpa)": 1_000.0, "pressure (pa)": 1.0}
 _META = re.compile(r"(?:^|/)meta/")
 _NS_PER_S = 1_000_000_000
 
@@ -43,9 +45,10 @@ def is_export(columns: Sequence[str]) -> bool:
 
 
 def read_export(files: Sequence[File], source: str) -> Readings:
-    """Return the IMU of an export. Raises ImportingError."""
+    """Return the IMU and the barometer of an export. Raises ImportingError."""
     left_out, starts = LeftOut(), _starts(files)
     streams: dict[str, Stream] = {}
+    pressure = no_readings()
     for file in files:
         if _META.search(file.name) or not file.name.lower().endswith((".csv", ".txt", ".tsv")):
             continue
@@ -57,7 +60,11 @@ def read_export(files: Sequence[File], source: str) -> Readings:
                     "too: make the export again, or leave one of the files out"
                 )
             streams[sensor] = _stream(table, places, starts, left_out, sensor)
+        for place, factor in _pressures(table.columns):
+            sent = _stream(table, [place], starts, left_out, "pressures")
+            pressure = Stream(sent.t_ns, factor * sent.values)
     readings = imu_readings({name: stream for name, stream in streams.items() if len(stream)}, Signs.ANDROID, source)
+    readings.pressure = pressure
     readings.left_out.add_all(left_out)
     readings.notes.insert(0, f"{source}: an export of phyphox")
     if starts is None:
@@ -76,20 +83,26 @@ def _sensors(columns: Sequence[str]) -> dict[str, list[int]]:
     return {sensor: [axes[axis] for axis in "xyz"] for sensor, axes in found.items() if len(axes) == 3}
 
 
+def _pressures(columns: Sequence[str]) -> list[tuple[int, float]]:
+    """Return the place of each column of pressures, and how many Pa its unit is."""
+    names = enumerate(name.lower() for name in columns)
+    return [(place, _PRESSURES[name]) for place, name in names if name in _PRESSURES]
+
+
 def _stream(table: TextTable, places: list[int], starts: Starts | None, left_out: LeftOut, what: str) -> Stream:
     times, values = array("d"), array("d")
     for line, cells in table.rows(left_out):
         try:
-            t, x, y, z = (number(cells[place]) for place in (0, *places))
+            t, *numbers = (number(cells[place]) for place in (0, *places))
         except ValueError:
-            t = x = y = z = None
-        if t is None or x is None or y is None or z is None:
+            t = None
+        if t is None or None in numbers:
             left_out.add(table.name, "a value is not a number", line)
         else:
             times.append(t)
-            values.extend((x, y, z))
+            values.extend(value for value in numbers if value is not None)
     t_ns = _t_ns(np.asarray(times), starts)
-    return stream_of(t_ns, np.asarray(values).reshape(-1, 3), table.name, what, left_out)
+    return stream_of(t_ns, np.asarray(values).reshape(-1, len(places)), table.name, what, left_out)
 
 
 def _t_ns(experiment_s: Array, starts: Starts | None) -> Array:

@@ -17,24 +17,30 @@ from dropanchor_service.importing.tables.table import exact_number, number
 from dropanchor_service.importing.tables.text_table import TextTable, read_table
 from dropanchor_tag_client.sources.phones.pairing import Signs
 from dropanchor_tag_client.sources.phones.readings import SENSORS
+from dropanchor_tag_client.sources.phones.sensor_logger import PA_PER_MBAR
 
-_COLUMNS = ("time", "x", "y", "z")
+_TIME, _VECTOR = "time", ("x", "y", "z")
+_BAROMETER = "barometer"
 _MARK = "seconds_elapsed"
 _METADATA = "metadata"
 
 
 def is_export(columns: Sequence[str]) -> bool:
     """Return whether a table with these columns comes from the app."""
-    return _MARK in columns and set(_COLUMNS) <= set(columns)
+    return _MARK in columns and {_TIME, *_VECTOR} <= set(columns)
 
 
 def read_export(files: Sequence[File], source: str, signs: Signs) -> Readings:
-    """Return the IMU of an export. Raises ImportingError."""
+    """Return the IMU and the barometer of an export. Raises ImportingError."""
     left_out = LeftOut()
-    streams = {file.stem: _stream(read_table(file), left_out) for file in files if file.stem in SENSORS}
+    streams = {file.stem: _stream(read_table(file), _VECTOR, left_out) for file in files if file.stem in SENSORS}
     metadata = next((_metadata(file) for file in files if file.stem == _METADATA), {})
     told = signs if signs is not Signs.AUTO else _signs(metadata)
     readings = imu_readings({name: stream for name, stream in streams.items() if len(stream)}, told, source)
+    for file in files:
+        if file.stem == _BAROMETER:
+            mbar = _stream(read_table(file), ("pressure",), left_out)
+            readings.pressure = Stream(mbar.t_ns, PA_PER_MBAR * mbar.values)
     readings.left_out.add_all(left_out)
     readings.notes.insert(0, f"{source}: an export of Sensor Logger{_platform(metadata)}")
     if told is Signs.AUTO:
@@ -44,28 +50,29 @@ def read_export(files: Sequence[File], source: str, signs: Signs) -> Readings:
         )
     elif told is Signs.IOS:
         readings.notes.append(f"{source}: accelerations of an iPhone: their sign is turned round")
-    unused = sorted(file.name for file in files if file.stem not in (*SENSORS, _METADATA))
+    unused = sorted(file.name for file in files if file.stem not in (*SENSORS, _METADATA, _BAROMETER))
     if unused:
         readings.notes.append(f"{source}: not used: {', '.join(unused[:8])}{', …' if len(unused) > 8 else ''}")
     return readings
 
 
-def _stream(table: TextTable, left_out: LeftOut) -> Stream:
-    if missing := set(_COLUMNS) - set(table.columns):
+def _stream(table: TextTable, columns: Sequence[str], left_out: LeftOut) -> Stream:
+    if missing := {_TIME, *columns} - set(table.columns):
         raise ImportingError(f"{table.name} lacks the columns {', '.join(sorted(missing))} of Sensor Logger")
-    places = [table.columns.index(name) for name in _COLUMNS]
+    places = [table.columns.index(name) for name in (_TIME, *columns)]
     t_ns, values = array("q"), array("d")
     for line, cells in table.rows(left_out):
         try:
-            t, (x, y, z) = exact_number(cells[places[0]]), [number(cells[place]) for place in places[1:]]
+            t, numbers = exact_number(cells[places[0]]), [number(cells[place]) for place in places[1:]]
         except ValueError:
-            t = x = y = z = None
-        if t is None or x is None or y is None or z is None:
+            t, numbers = None, []
+        if t is None or None in numbers:
             left_out.add(table.name, "a value is not a number", line)
         else:
             t_ns.append(int(t))
-            values.extend((x, y, z))
-    return stream_of(np.asarray(t_ns, np.int64), np.asarray(values).reshape(-1, 3), table.name, "readings", left_out)
+            values.extend(value for value in numbers if value is not None)
+    vectors = np.asarray(values).reshape(-1, len(columns))
+    return stream_of(np.asarray(t_ns, np.int64), vectors, table.name, "readings", left_out)
 
 
 def _metadata(file: File) -> Mapping[str, str]:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, RANGE, ImportingError
+from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, PRESSURE, RANGE, ImportingError
 from dropanchor_service.importing.tables.mapping import ANCHOR, POSITION, T_NSEC, VECTORS, WIDE, Column, T, quantity_of
 from dropanchor_service.importing.tables.units import SI, known
 
@@ -51,6 +51,8 @@ _IDS = {"id", "mac", "addr", "address"}  # of the anchor, beside a range
 _OF_ANCHORS = {"id", "addr", "address", "mac", "name", "short", "device", "range", "ranges", "uwb", "to", "from"}
 _STDS = {"std", "stddev", "sigma", "stdev", "uncertainty"}
 _HEADINGS = {"heading", "yaw"}
+_PRESSURES = {"pressure", "press", "barometer", "baro", "barometric", "air", "fluid"}
+_PRESSURE_NAMES = {"pressure", "press", "baro", "barometer"}
 _BARE = {"vector", "value", "values", "data", "xyz"}
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+|°/?s?")
@@ -199,6 +201,8 @@ def _scalar(words: list[str]) -> _Found | None:
         return _Found(ANCHOR, None, len(words))
     if found & _HEADINGS and len(found) == 1:
         return _Found(HEADING, None, len(words))
+    if found & _PRESSURE_NAMES and found <= _PRESSURES:
+        return _Found(PRESSURE, None, len(words))
     if found & _RANGE_NAMES and found <= _RANGES:
         return _Found(RANGE, None, len(words))
     return None

@@ -7,13 +7,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, RANGE, TIME, ImportingError
+from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, PRESSURE, RANGE, TIME, ImportingError
 from dropanchor_service.importing.tables.units import conversion
 from dropanchor_tag_client.command_line import did_you_mean
 
 T, T_NSEC, ANCHOR = "t", "t_nsec", "anchor"
 WIDE = "range."
-_AXES = {ACC: ("ax", "ay", "az"), GYRO: ("gx", "gy", "gz"), MAG: ("mx", "my", "mz")}
+_AXES = {ACC: ("ax", "ay", "az"), GYRO: ("gx", "gy", "gz"), MAG: ("mx", "my", "mz"), PRESSURE: ("pressure",)}
 VECTORS: Mapping[str, tuple[str, ...]] = _AXES
 QUANTITIES: Mapping[str, str] = {
     T: TIME,

@@ -4,19 +4,20 @@ import math
 import re
 from typing import NamedTuple
 
-from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, RANGE, TIME, ImportingError
+from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, PRESSURE, RANGE, TIME, ImportingError
 
 G_MPS2 = 9.80665  # standard gravity, ISO 80000-3
 INCH_M = 0.0254
 COMPASS, ISO = "deg_compass", "iso"
 
-SI = {ACC: "m/s2", GYRO: "rad/s", MAG: "uT", RANGE: "m", HEADING: "rad", TIME: "s"}
+SI = {ACC: "m/s2", GYRO: "rad/s", MAG: "uT", RANGE: "m", HEADING: "rad", TIME: "s", PRESSURE: "Pa"}
 _FACTORS: dict[str, dict[str, float]] = {
     ACC: {"m/s2": 1.0, "g": G_MPS2, "mg": G_MPS2 / 1e3, "cm/s2": 0.01, "mm/s2": 1e-3},
     GYRO: {"rad/s": 1.0, "deg/s": math.pi / 180, "mdeg/s": math.pi / 180e3, "mrad/s": 1e-3, "rpm": math.pi / 30},
     MAG: {"uT": 1.0, "nT": 1e-3, "mT": 1e3, "T": 1e6, "gauss": 100.0, "mgauss": 0.1},
     RANGE: {"m": 1.0, "cm": 0.01, "mm": 1e-3, "km": 1e3, "ft": 12 * INCH_M, "in": INCH_M},
     HEADING: {"rad": 1.0, "deg": math.pi / 180, COMPASS: -math.pi / 180},
+    PRESSURE: {"Pa": 1.0, "hPa": 100.0, "kPa": 1e3},
     TIME: {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0, "min": 60e9, ISO: 1.0},
 }
 _ALIASES: dict[str, dict[str, str]] = {
@@ -34,6 +35,7 @@ _ALIASES: dict[str, dict[str, str]] = {
     | dict.fromkeys(("feet", "foot"), "ft")
     | dict.fromkeys(("inch", "inches"), "in"),
     HEADING: dict.fromkeys(("degree", "degrees", "°"), "deg") | dict.fromkeys(("radian", "radians"), "rad"),
+    PRESSURE: dict.fromkeys(("mbar", "mb", "millibar", "hectopascal"), "hPa") | dict.fromkeys(("pascal",), "Pa"),
     TIME: dict.fromkeys(("sec", "secs", "second", "seconds"), "s")
     | dict.fromkeys(("msec", "msecs", "millis", "millisecond", "milliseconds"), "ms")
     | dict.fromkeys(("usec", "usecs", "micros", "microsecond", "microseconds"), "us")

@@ -28,7 +28,8 @@ units and radians. `t_ns` is an integer, UTC in ns; `t_utc` is the same time for
 timestamp. Ids such as `tag` and `anchor` are texts, also where they look like numbers. In CSV, an unknown value is an
 empty cell; in JSON and Parquet it is null. [How to read exports](../how-to/read-exports.md) in Python and DuckDB.
 
-A GeoJSON feature has the fields of JSON as properties. GPX holds only latitude, longitude, altitude, `time` and state.
+A GeoJSON feature has the fields of JSON as properties. GPX holds only latitude, longitude, altitude, `time` and
+state; KML has no state.
 CSV and Parquet have the covariance as {", ".join(f"`{name}`" for name in COVARIANCES)}: m², m·rad and rad²,
 and `relative_pose` as columns that begin with `relative_`. In a recording `covariance` has nine numbers, row by row.
 `lat` and `lon` exist in a track if the site is georeferenced, and `alt_m` if its georeference has one, too.

@@ -77,6 +77,7 @@ def test_every_buffer_of_the_experiment_is_filled_sent_once_and_understood() -> 
         "gyroscope": 1,
         "magnetometer": 1,
     }
+    assert [one.pressure_pa for one in understood.pressures] == [1.0]
 
 
 def test_a_tag_whose_name_needs_escapes_gets_an_experiment_that_can_be_read() -> None:

@@ -21,6 +21,7 @@ SECOND = 1_000_000_000
 RETENTION = Retention(SECOND, 0.1, 5 * SECOND, 10**18, 2**40)
 GEOREFERENCED = Site(anchors=[Anchor(id="17")], georeference=Georeference(lat=52.5, lon=13.4))
 SECONDS = 600
+KML, GX = "{http://www.opengis.net/kml/2.2}", "{http://www.google.com/kml/ext/2.2}"
 GPX = "{http://www.topografix.com/GPX/1/1}"
 
 
@@ -75,8 +76,8 @@ def test_csv_has_every_column_and_latitudes_only_on_a_georeferenced_site(tmp_pat
     assert "lat" not in rows[0]
 
 
-@pytest.mark.parametrize("form", ["geojson", "gpx"])
-def test_geojson_and_gpx_need_a_georeference(tmp_path: Path, form: str) -> None:
+@pytest.mark.parametrize("form", ["geojson", "gpx", "kml"])
+def test_formats_for_maps_need_a_georeference(tmp_path: Path, form: str) -> None:
     assert kind_of(ask(driven(tmp_path).app(), "GET", f"/api/v1/tags/a/track?format={form}")) == "not-georeferenced"
 
 
@@ -92,6 +93,28 @@ def test_gpx_and_geojson_hold_geographic_coordinates(tmp_path: Path) -> None:
     features = ask(bench.app(), "GET", "/api/v1/tags/a/track", headers=accept).json()["features"]
     assert features[-1]["geometry"]["coordinates"][0] == pytest.approx(float(points[-1].attrib["lon"]))
     assert features[-1]["properties"]["covariance"][0][0] == 0.04
+
+
+def test_kml_holds_times_and_places_in_a_track_for_each_stretch_without_a_gap(tmp_path: Path) -> None:
+    bench = driven(tmp_path, GEOREFERENCED)
+    bench.now_ns += 60 * SECOND
+    for x in (0.0, 7.0, 14.0):
+        bench.move("a", x=x)
+        bench.now_ns += SECOND
+    bench.write_history()
+    kml = ask(bench.app(), "GET", "/api/v1/tags/a/track?format=kml")
+    assert kml.headers["content-type"] == "application/vnd.google-earth.kml+xml"
+    root = ElementTree.fromstring(kml.text)
+    assert [name.text for name in root.iter(f"{KML}name")] == ["a"]
+    first, second = root.iter(f"{GX}Track")
+    whens, places = ([one.text for one in first.iter(tag)] for tag in (f"{KML}when", f"{GX}coord"))
+    assert (len(whens), len(places), whens[-1]) == (SECONDS + 1, SECONDS + 1, "2027-01-15T08:00:00.000Z")
+    assert [mode.text for mode in first.iter(f"{KML}altitudeMode")] == ["clampToGround"]
+    lon, lat, _ = map(float, str(places[-1]).split())
+    gpx = ElementTree.fromstring(ask(bench.app(), "GET", "/api/v1/tags/a/track?format=gpx").text)
+    point = list(gpx.iter(f"{GPX}trkpt"))[SECONDS].attrib
+    assert (lon, lat) == (float(point["lon"]), float(point["lat"]))
+    assert len(list(second.iter(f"{GX}coord"))) == 3
 
 
 def test_exports_have_heights_and_altitudes_where_that_of_the_site_is_known(tmp_path: Path) -> None:
@@ -110,6 +133,9 @@ def test_exports_have_heights_and_altitudes_where_that_of_the_site_is_known(tmp_
     inside = [[child.tag.removeprefix(GPX) for child in point] for point in points]
     assert inside == [["ele", "time", "type"], ["time", "type"]]  # in the order of the standard
     assert "<ele>37.750</ele>" in exported("gpx")
+    assert "clampToGround" in exported("kml")  # one altitude is not known
+    known = ask(bench.app(), "GET", f"/api/v1/tags/a/track?from={T_NS}&to={T_NS}&format=kml").text
+    assert ("<altitudeMode>absolute" in known, " 37.750</gx:coord>" in known) == (True, True)
     features = TrackFeatureCollection.model_validate_json(exported("geojson")).features
     heights = [feature.geometry.coordinates[2:] for feature in features if feature.geometry is not None]
     assert heights == [[37.75], []]
@@ -122,17 +148,19 @@ def test_exports_have_heights_and_altitudes_where_that_of_the_site_is_known(tmp_
     assert (second.z, second.z_std_m, second.z_source, second.alt_m) == (None,) * 4
 
 
-def test_gpx_leaves_out_ambiguous_poses(tmp_path: Path) -> None:
+def test_gpx_and_kml_leave_out_ambiguous_poses(tmp_path: Path) -> None:
     bench = driven(tmp_path, GEOREFERENCED)
     bench.now_ns = T_NS + SECOND
     bench.move("a", x=0.0, state=State.AMBIGUOUS)
     bench.write_history()
     text = ask(bench.app(), "GET", "/api/v1/tags/a/track?format=gpx").text
     assert text.count("<trkpt") == SECONDS + 1
+    kml = ask(bench.app(), "GET", "/api/v1/tags/a/track?format=kml").text
+    assert kml.count("<when>") == SECONDS + 1
 
 
 @pytest.mark.parametrize(
-    "query", ["from=2&to=1", "limit=0", "limit=10001", "from=-1", "cursor=x", "format=kml", "form=csv", "from=0"]
+    "query", ["from=2&to=1", "limit=0", "limit=10001", "from=-1", "cursor=x", "format=shp", "form=csv", "from=0"]
 )
 def test_invalid_track_parameters_are_refused(tmp_path: Path, query: str) -> None:
     assert kind_of(ask(driven(tmp_path).app(), "GET", f"/api/v1/tags/a/track?{query}")) == "invalid-request"

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -106,6 +107,8 @@ def test_a_file_holds_every_pose_once_however_many_pages_that_takes(
     gpx = ElementTree.fromstring(exported(bench, "gpx"))
     assert len(list(gpx.iter("{http://www.topografix.com/GPX/1/1}trkpt"))) == len(expected)
     assert len(list(gpx.iter("{http://www.topografix.com/GPX/1/1}trkseg"))) == 1
+    whens = re.findall("<when>(.+?)</when>", exported(bench, "kml"))
+    assert (sorted(whens), len(set(whens))) == (whens, len(expected))  # the last one of a page begins the next track
 
 
 def parquet(bench: ApiBench, query: str = "") -> pq.ParquetFile:
@@ -161,14 +164,14 @@ def test_unknown_numbers_are_null_in_parquet_and_no_poses_are_no_rows(tmp_path: 
 
 def test_a_track_without_poses_is_an_empty_file(tmp_path: Path) -> None:
     bench = driven(tmp_path, GEOREFERENCED)
-    for form in ("csv", "json", "geojson", "gpx"):
+    for form in ("csv", "json", "geojson", "gpx", "kml"):
         response = ask(bench.app(), "GET", f"/api/v1/tags/a/track/file?format={form}&from=0&to=1")
         assert response.status_code == 200
         if "json" in form:
             assert response.json()["features" if form == "geojson" else "poses"] == []
 
 
-@pytest.mark.parametrize("form", ["geojson", "gpx"])
+@pytest.mark.parametrize("form", ["geojson", "gpx", "kml"])
 def test_a_site_without_a_georeference_says_what_to_do(tmp_path: Path, form: str) -> None:
     refused = ask(driven(tmp_path).app(), "GET", f"/api/v1/tags/a/track/file?format={form}")
     assert kind_of(refused) == "not-georeferenced"
@@ -179,7 +182,7 @@ def test_a_file_of_an_unknown_tag_or_of_no_history_is_a_problem(tmp_path: Path) 
     bench = driven(tmp_path)
     assert kind_of(ask(bench.app(), "GET", "/api/v1/tags/nobody/track/file")) == "unknown-tag"
     assert kind_of(ask(make_api_bench().app(), "GET", "/api/v1/tags/a/track/file")) == "no-history"
-    assert kind_of(ask(bench.app(), "GET", "/api/v1/tags/a/track/file?format=kml")) == "invalid-request"
+    assert kind_of(ask(bench.app(), "GET", "/api/v1/tags/a/track/file?format=shp")) == "invalid-request"
 
 
 def test_the_history_says_which_time_it_covers(tmp_path: Path) -> None:
