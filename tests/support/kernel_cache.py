@@ -10,6 +10,7 @@ import hashlib
 import os
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 from support.commands import environment
@@ -43,11 +44,20 @@ def use_cache_of_these_sources() -> None:
 @functools.cache
 def compile_once() -> None:
     """Fill the cache, so that a service can start within a time limit. One process compiles while the others wait."""
-    folder = Path(os.environ["NUMBA_CACHE_DIR"])
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / "lock").open("w") as lock:
+    mark = _mark("filled")
+    mark.parent.mkdir(parents=True, exist_ok=True)
+    with (mark.parent / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        subprocess.run([sys.executable, "-m", "dropanchor_service", "compile"], env=environment(), check=True)
+        if not mark.exists():
+            subprocess.run([sys.executable, "-m", "dropanchor_service", "compile"], env=environment(), check=True)
+            mark.touch()
+
+
+def _mark(what: str) -> Path:
+    """Return the file that says that this is done. numba compiles again for another version or sources written anew."""
+    from dropanchor_service.runtime.kernel_cache import sources_stamp
+
+    return Path(os.environ["NUMBA_CACHE_DIR"]) / f"{what}-{version('numba')}-{sources_stamp()}"
 
 
 def prepare() -> None:
@@ -55,10 +65,7 @@ def prepare() -> None:
 
     Without this each worker compiles both, and several compile the same at a time.
     """
-    from dropanchor_service.runtime.kernel_cache import sources_stamp
-
-    mark = Path(os.environ["NUMBA_CACHE_DIR"]) / f"prepared-{sources_stamp()}"
-    if mark.exists():
+    if (mark := _mark("prepared")).exists():
         return
     sys.stdout.write("== compiling the estimators and the tests, for minutes (once after a change of the estimators)\n")
     compile_with_smoothers()
