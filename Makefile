@@ -54,7 +54,6 @@ docs: install
 
 kernels: install
 	@PYTHONPATH=tests $(BIN)/python -m support.kernel_cache
-	@$(BIN)/python -m pytest --collect-only -q >/dev/null # compiles the tests once, and not once in each worker
 
 chromium:
 	@command -v chromium-headless-shell >/dev/null || { \
@@ -88,7 +87,7 @@ postgresql:
 		apt-get update -qq && apt-get install -y -qq postgresql >/dev/null; } || \
 		echo 'The tests with a database need the package postgresql: without it they are skipped.' >&2
 
-test: install $(if $(FAST),,chromium mosquitto proxies postgresql)
+test: install $(if $(FAST),,chromium mosquitto proxies postgresql kernels)
 	@echo '== running $(if $(FAST),the fast,all) tests'
 	@$(BIN)/python -m pytest $(if $(FAST),$(FAST_TESTS),$(PARALLEL)) $(PYTEST)
 

@@ -1,6 +1,7 @@
 """Tags that speak HTTP only, through a real service: a key, posted batches, a pose over REST."""
 
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,14 @@ SENSORS = {
 }
 PHONE, SAMPLES = "/api/v1/ingest/sensor-logger", "/api/v1/ingest/samples"
 PHYPHOX = "/api/v1/ingest/phyphox"
+TAGS = ("anna", "every-second", "phyphox", "no-numbers", "socket", "again", "gap")
+"""One for each test that shares the service."""
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+    with running_service("--config", str(settings_file(tmp_path_factory.mktemp("service"), TAGS))) as running:
+        yield running
 
 
 def ranges(seconds: int, start_ns: int) -> list[bytes]:
@@ -32,46 +41,46 @@ def ranges(seconds: int, start_ns: int) -> list[bytes]:
     return [encode_json(Frame(ranges=part, sequence=n, boot_id=7)) for n, part in enumerate(parts)]
 
 
-def test_a_phone_and_ranges_from_elsewhere_for_the_same_tag_become_a_pose(tmp_path: Path) -> None:
-    config, seconds = settings_file(tmp_path, ["anna"]), 20
+def test_a_phone_and_ranges_from_elsewhere_for_the_same_tag_become_a_pose(service: Running) -> None:
+    seconds = 20
     start_ns = time.time_ns() - seconds * 1_000_000_000
     batches = list(recording(seconds, SENSORS, start_ns=start_ns))
     batches[3], batches[4] = batches[4], batches[3]
-    with running_service("--config", str(config)) as service:
-        for batch, distances in zip([*batches, batches[3]], [*ranges(seconds, start_ns), None], strict=True):
-            assert service.ask("POST", f"{PHONE}?tag=anna", content=batch).status_code == 200
-            if distances is not None:
-                json = {"content-type": ENCODING_JSON}
-                answer = service.ask("POST", f"{SAMPLES}?tag=anna", content=distances, headers=json)
-                assert (answer.status_code, answer.json()) == (202, {"samples": 10})
-        wait_until(lambda: samples(service, {}) == {"imu": 100 * seconds - 1, "range": 10 * seconds})
-        wait_until(lambda: service.get("/api/v1/tags/anna/pose")["t_ns"] > start_ns + (seconds - 1) * 1_000_000_000)
-        pose = service.get("/api/v1/tags/anna/pose")
-        status = service.get("/api/v1/tags/anna")
-        service.ask("POST", f"{SAMPLES}?tag=anna", content=b"{", headers={"content-type": ENCODING_JSON})
-        wait_until(lambda: service.metric('dropanchor_rejected_total{reason="json_syntax"}') == 1)
-        wait_until(lambda: service.get("/api/v1/tags/anna")["rejected"] == {"json_syntax": 1} | status["rejected"])
+    for batch, distances in zip([*batches, batches[3]], [*ranges(seconds, start_ns), None], strict=True):
+        assert service.ask("POST", f"{PHONE}?tag=anna", content=batch).status_code == 200
+        if distances is not None:
+            json = {"content-type": ENCODING_JSON}
+            answer = service.ask("POST", f"{SAMPLES}?tag=anna", content=distances, headers=json)
+            assert (answer.status_code, answer.json()) == (202, {"samples": 10})
+    wait_until(lambda: samples(service, "anna") == {"imu": 100 * seconds - 1, "range": 10 * seconds})
+    wait_until(lambda: service.get("/api/v1/tags/anna/pose")["t_ns"] > start_ns + (seconds - 1) * 1_000_000_000)
+    pose = service.get("/api/v1/tags/anna/pose")
+    status = service.get("/api/v1/tags/anna")
+    wrong = 'dropanchor_rejected_total{reason="json_syntax"}'
+    before = service.metric(wrong)
+    service.ask("POST", f"{SAMPLES}?tag=anna", content=b"{", headers={"content-type": ENCODING_JSON})
+    wait_until(lambda: service.metric(wrong) == before + 1)
+    wait_until(lambda: service.get("/api/v1/tags/anna")["rejected"] == {"json_syntax": 1} | status["rejected"])
     assert set(status["rejected"]) == {"late"}  # the message that the next one overtook
     assert status["rejected"]["late"] < 300
     assert pose["anchor"] == "7"
 
 
-def test_a_phone_that_posts_every_second_has_poses_that_come_a_second_later(tmp_path: Path) -> None:
+def test_a_phone_that_posts_every_second_has_poses_that_come_a_second_later(service: Running) -> None:
     seconds, step_ns = 12, 100_000_000
-    with running_service("--config", str(settings_file(tmp_path, ["anna"]))) as service:
-        start_ns = time.time_ns()
-        walk = straight_north(10 * seconds, start_ns + seconds * 10 * step_ns).ranges
-        batches = list(recording(seconds, SENSORS, start_ns=start_ns))
-        poses = []
-        for number, distance in enumerate(walk):
-            time.sleep(max(0.0, (distance.t_ns - time.time_ns()) * 1e-9))
-            content = encode_json(Frame(ranges=[distance], sequence=number, boot_id=7))
-            service.ask("POST", f"{SAMPLES}?tag=anna", content=content, headers={"content-type": ENCODING_JSON})
-            if number % 10 == 9:
-                service.ask("POST", f"{PHONE}?tag=anna", content=batches[number // 10])
-            if number % 10 == 5 and number > 80:
-                poses.append(service.get("/api/v1/tags/anna/pose"))
-        status = service.get("/api/v1/tags/anna")
+    start_ns = time.time_ns()
+    walk = straight_north(10 * seconds, start_ns + seconds * 10 * step_ns).ranges
+    batches = list(recording(seconds, SENSORS, start_ns=start_ns))
+    poses = []
+    for number, distance in enumerate(walk):
+        time.sleep(max(0.0, (distance.t_ns - time.time_ns()) * 1e-9))
+        content = encode_json(Frame(ranges=[distance], sequence=number, boot_id=7))
+        service.ask("POST", f"{SAMPLES}?tag=every-second", content=content, headers={"content-type": ENCODING_JSON})
+        if number % 10 == 9:
+            service.ask("POST", f"{PHONE}?tag=every-second", content=batches[number // 10])
+        if number % 10 == 5 and number > 80:
+            poses.append(service.get("/api/v1/tags/every-second/pose"))
+    status = service.get("/api/v1/tags/every-second")
     assert len(poses) == 4
     assert {pose["state"] for pose in poses} <= {"tracking", "ambiguous"}
     assert not any(pose["hint"].startswith(("No ", "The motion", "Samples")) for pose in poses)
@@ -80,8 +89,8 @@ def test_a_phone_that_posts_every_second_has_poses_that_come_a_second_later(tmp_
     assert status["used"] == status["arrived"]
 
 
-def test_an_experiment_of_phyphox_and_ranges_from_elsewhere_become_a_pose(tmp_path: Path) -> None:
-    config, seconds = settings_file(tmp_path, ["anna"]), 20
+def test_an_experiment_of_phyphox_and_ranges_from_elsewhere_become_a_pose(service: Running) -> None:
+    seconds = 20
     start_ns = time.time_ns() - seconds * 1_000_000_000
     sensors: dict[str, phyphox.Value] = {
         "gyroscope": lambda _: (0.0, 0.0, 0.0),
@@ -89,16 +98,15 @@ def test_an_experiment_of_phyphox_and_ranges_from_elsewhere_become_a_pose(tmp_pa
         "magnetometer": lambda _: (0.0, 20.0, -40.0),
     }
     batches = list(phyphox.recording(seconds, sensors, start_ns * 1e-9, interval_s=1.0))
-    with running_service("--config", str(config)) as service:
-        for batch, distances in zip([*batches, batches[3]], [*ranges(seconds, start_ns), None], strict=True):
-            assert service.ask("POST", f"{PHYPHOX}?tag=anna", content=batch).status_code == 200
-            if distances is not None:
-                json = {"content-type": ENCODING_JSON}
-                service.ask("POST", f"{SAMPLES}?tag=anna", content=distances, headers=json)
-        wait_until(lambda: samples(service, {}) == {"imu": 100 * seconds - 1, "range": 10 * seconds})
-        wait_until(lambda: service.get("/api/v1/tags/anna/pose")["t_ns"] > start_ns + (seconds - 1) * 1_000_000_000)
-        assert service.ask("POST", f"{PHYPHOX}?tag=anna", content=b"{").status_code == 422
-        wait_until(lambda: service.get("/api/v1/tags/anna")["rejected"].get("json_syntax") == 1)
+    for batch, distances in zip([*batches, batches[3]], [*ranges(seconds, start_ns), None], strict=True):
+        assert service.ask("POST", f"{PHYPHOX}?tag=phyphox", content=batch).status_code == 200
+        if distances is not None:
+            json = {"content-type": ENCODING_JSON}
+            service.ask("POST", f"{SAMPLES}?tag=phyphox", content=distances, headers=json)
+    wait_until(lambda: samples(service, "phyphox") == {"imu": 100 * seconds - 1, "range": 10 * seconds})
+    wait_until(lambda: service.get("/api/v1/tags/phyphox/pose")["t_ns"] > start_ns + (seconds - 1) * 1_000_000_000)
+    assert service.ask("POST", f"{PHYPHOX}?tag=phyphox", content=b"{").status_code == 422
+    wait_until(lambda: service.get("/api/v1/tags/phyphox")["rejected"].get("json_syntax") == 1)
 
 
 def test_a_phone_over_http_is_online_and_its_empty_battery_is_told(tmp_path: Path) -> None:
@@ -115,15 +123,14 @@ def test_a_phone_over_http_is_online_and_its_empty_battery_is_told(tmp_path: Pat
         assert [care["reason"] for care in status["needs_care"]] == ["battery_low"]
 
 
-def test_a_phone_whose_gyroscope_gives_no_numbers_is_told_so_over_http(tmp_path: Path) -> None:
+def test_a_phone_whose_gyroscope_gives_no_numbers_is_told_so_over_http(service: Running) -> None:
     sensors = SENSORS | {"gyroscope": lambda _: (float("nan"), 0.0, 0.0)}
-    with running_service("--config", str(settings_file(tmp_path, ["anna"]))) as service:
-        for batch in recording(2, sensors, start_ns=time.time_ns() - 2_000_000_000):
-            answer = service.ask("POST", f"{PHONE}?tag=anna", content=batch)
-            assert (answer.status_code, answer.text.partition(":")[0]) == (
-                499,
-                "The readings of Gyroscope are not numbers",
-            )
+    for batch in recording(2, sensors, start_ns=time.time_ns() - 2_000_000_000):
+        answer = service.ask("POST", f"{PHONE}?tag=no-numbers", content=batch)
+        assert (answer.status_code, answer.text.partition(":")[0]) == (
+            499,
+            "The readings of Gyroscope are not numbers",
+        )
 
 
 def test_a_phone_whose_clock_is_ahead_of_the_ranges_is_told(tmp_path: Path) -> None:
@@ -142,41 +149,39 @@ def test_a_phone_whose_clock_is_ahead_of_the_ranges_is_told(tmp_path: Path) -> N
         assert abs(service.metric("dropanchor_clock_offset_seconds_max") - 0.8) < 0.3
 
 
-def test_an_open_web_socket_makes_its_tag_online(tmp_path: Path) -> None:
-    config = settings_file(tmp_path, ["anna"])
-    with running_service("--config", str(config)) as service:
-        url = f"{service.url.replace('http', 'ws')}/api/v1/ingest/stream?tag=anna"
+def test_an_open_web_socket_makes_its_tag_online(service: Running) -> None:
+    url = f"{service.url.replace('http', 'ws')}/api/v1/ingest/stream?tag=socket"
+    with connect(url, proxy=None) as socket:
+        socket.recv(PATIENCE_S)
+        assert service.get("/api/v1/tags/socket")["online"]
+    wait_until(lambda: not service.get("/api/v1/tags/socket")["online"])
+
+
+def test_a_message_that_is_sent_again_over_a_web_socket_counts_as_a_duplicate_and_is_used_once(
+    service: Running,
+) -> None:
+    messages = ranges(3, time.time_ns() - 3_000_000_000)
+    url = f"{service.url.replace('http', 'ws')}/api/v1/ingest/stream?tag=again"
+    for sent in (messages[:2], messages[1:]):
         with connect(url, proxy=None) as socket:
-            socket.recv(PATIENCE_S)
-            assert service.get("/api/v1/tags/anna")["online"]
-        wait_until(lambda: not service.get("/api/v1/tags/anna")["online"])
+            assert SamplesAcknowledged.model_validate_json(socket.recv(PATIENCE_S)).message == 0
+            for message in sent:
+                socket.send(message.decode())
+                assert SamplesAcknowledged.model_validate_json(socket.recv(PATIENCE_S)).samples == 10
+    wait_until(lambda: samples(service, "again") == {"range": 30})
+    wait_until(lambda: service.get("/api/v1/tags/again")["rejected"] == {"duplicate": 1})
 
 
-def test_a_message_that_is_sent_again_over_a_web_socket_counts_as_a_duplicate_and_is_used_once(tmp_path: Path) -> None:
-    config, messages = settings_file(tmp_path, ["anna"]), ranges(3, time.time_ns() - 3_000_000_000)
-    with running_service("--config", str(config)) as service:
-        url = f"{service.url.replace('http', 'ws')}/api/v1/ingest/stream?tag=anna"
-        for sent in (messages[:2], messages[1:]):
-            with connect(url, proxy=None) as socket:
-                assert SamplesAcknowledged.model_validate_json(socket.recv(PATIENCE_S)).message == 0
-                for message in sent:
-                    socket.send(message.decode())
-                    assert SamplesAcknowledged.model_validate_json(socket.recv(PATIENCE_S)).samples == 10
-        wait_until(lambda: samples(service, {}) == {"range": 30})
-        wait_until(lambda: service.get("/api/v1/tags/anna")["rejected"] == {"duplicate": 1})
-
-
-def samples(service: Running, headers: dict[str, str]) -> dict[str, int]:
+def samples(service: Running, name: str, headers: dict[str, str] | None = None) -> dict[str, int]:
     answer = service.ask("GET", "/api/v1/tags", headers=headers).json()
-    return next((dict(tag["samples"]) for tag in answer["tags"] if tag["tag"] == "anna"), {})
+    return next((dict(tag["samples"]) for tag in answer["tags"] if tag["tag"] == name), {})
 
 
-def test_the_last_batch_is_used_although_the_one_before_never_comes(tmp_path: Path) -> None:
+def test_the_last_batch_is_used_although_the_one_before_never_comes(service: Running) -> None:
     first, _, third = recording(3, SENSORS, start_ns=time.time_ns())
-    with running_service("--config", str(settings_file(tmp_path, ["anna"]))) as service:
-        service.ask("POST", f"{PHONE}?tag=anna", content=first)
-        assert service.ask("POST", f"{PHONE}?tag=anna", content=third).json()["waiting"] == 1
-        wait_until(lambda: samples(service, {}).get("imu", 0) > 190)
+    service.ask("POST", f"{PHONE}?tag=gap", content=first)
+    assert service.ask("POST", f"{PHONE}?tag=gap", content=third).json()["waiting"] == 1
+    wait_until(lambda: samples(service, "gap").get("imu", 0) > 190)
 
 
 def test_a_key_made_by_the_command_is_all_a_phone_needs_and_never_gets_into_the_log(
@@ -200,7 +205,7 @@ def test_a_key_made_by_the_command_is_all_a_phone_needs_and_never_gets_into_the_
         assert service.ask("POST", f"{PHONE}?token={token}", content=b"nonsense").status_code == 499
         assert service.ask("POST", f"{PHONE}?token={token}x", content=b"{}").status_code == 401
         assert service.ask("POST", f"{PHONE}?token={token}&tag=bert", content=b"{}").status_code == 403
-        wait_until(lambda: samples(service, reader).get("imu", 0) == 199)
+        wait_until(lambda: samples(service, "anna", reader).get("imu", 0) == 199)
         assert service.stop() == 0
     log = "".join(service.log)
     assert token not in log

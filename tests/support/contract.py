@@ -15,7 +15,7 @@ from schemathesis.schemas import APIOperation
 
 Operation = APIOperation[Any, Any, Any, Any]
 
-EXAMPLES = int(os.environ.get("DROPANCHOR_CONTRACT_EXAMPLES", "10"))
+EXAMPLES = int(os.environ.get("DROPANCHOR_CONTRACT_EXAMPLES", "6"))
 """Valid requests per operation, and as many invalid ones. The seed is fixed, so that every run sends the same."""
 
 ANSWER_S = 120.0  # at most: some operations start a process, and the machine may be busy

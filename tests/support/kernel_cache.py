@@ -10,16 +10,22 @@ import hashlib
 import os
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 from support.commands import environment
 
 ROOT = Path(__file__).parents[2]
 _REST = """
+import numpy as np
+
+from dropanchor_evaluation.paper.compiled import algorithm1
 from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_front_end, warm_up_ingest, warm_up_zones
+from dropanchor_service.estimation.paper.parameters import TUNED
 
 for warm_up in (warm_up_front_end, warm_up_ingest, warm_up_answers, warm_up_zones):
     warm_up()
+algorithm1(np.arange(2.0), np.zeros(2), np.ones(2), (1.0, 0.0, 0.0), TUNED)
 """
 
 
@@ -38,15 +44,38 @@ def use_cache_of_these_sources() -> None:
 @functools.cache
 def compile_once() -> None:
     """Fill the cache, so that a service can start within a time limit. One process compiles while the others wait."""
-    folder = Path(os.environ["NUMBA_CACHE_DIR"])
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / "lock").open("w") as lock:
+    mark = _mark("filled")
+    mark.parent.mkdir(parents=True, exist_ok=True)
+    with (mark.parent / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        subprocess.run([sys.executable, "-m", "dropanchor_service", "compile"], env=environment(), check=True)
+        if not mark.exists():
+            subprocess.run([sys.executable, "-m", "dropanchor_service", "compile"], env=environment(), check=True)
+            mark.touch()
+
+
+def _mark(what: str) -> Path:
+    """Return the file that says that this is done. numba compiles again for another version or sources written anew."""
+    from dropanchor_service.runtime.kernel_cache import sources_stamp
+
+    return Path(os.environ["NUMBA_CACHE_DIR"]) / f"{what}-{version('numba')}-{sources_stamp()}"
+
+
+def prepare() -> None:
+    """Compile the kernels and the tests, unless that was done with these sources.
+
+    Without this each worker compiles both, and several compile the same at a time.
+    """
+    if (mark := _mark("prepared")).exists():
+        return
+    sys.stdout.write("== compiling the estimators and the tests, for minutes (once after a change of the estimators)\n")
+    compile_with_smoothers()
+    collect = [sys.executable, "-m", "pytest", "--collect-only", "-q"]
+    if subprocess.run(collect, stdout=subprocess.DEVNULL, check=False).returncode == 0:
+        mark.touch()
 
 
 def compile_with_smoothers() -> None:
-    """Fill the cache with what the service and the tests of smoothing need, on two processors.
+    """Fill the cache with what the service and the tests of smoothing and of the paper need, on two processors.
 
     The smoothers follow the belief in its process, which has compiled most of what they call.
     """
@@ -70,4 +99,4 @@ def _compile_smoothers() -> None:
 
 if __name__ == "__main__":
     use_cache_of_these_sources()
-    compile_with_smoothers()
+    prepare()

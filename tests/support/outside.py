@@ -1,5 +1,6 @@
 """Which tests need more than this process, or take long: `make test FAST=1` leaves them out."""
 
+import functools
 from pathlib import Path
 
 import pytest
@@ -54,7 +55,7 @@ LONG = (
 
 def is_long(item: pytest.Item) -> bool:
     """Return whether a test is one of LONG."""
-    return any(_path(item).is_relative_to(one) for one in LONG)
+    return _is_in(_path(item), LONG)
 
 
 def is_outside(item: pytest.Item) -> bool:
@@ -67,5 +68,15 @@ def is_outside(item: pytest.Item) -> bool:
     )
 
 
+@functools.cache  # thousands of tests are in hundreds of files
+def _is_in(path: Path, several: tuple[str, ...]) -> bool:
+    return any(path.is_relative_to(one) for one in several)
+
+
 def _path(item: pytest.Item) -> Path:
-    return item.path.relative_to(item.config.rootpath / "tests")
+    return _below(item.path, item.config.rootpath / "tests")
+
+
+@functools.cache
+def _below(path: Path, folder: Path) -> Path:
+    return path.relative_to(folder)

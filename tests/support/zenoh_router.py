@@ -114,4 +114,4 @@ def wait_until(condition: Callable[[], object], timeout_s: float = PATIENCE_S) -
     while not condition():
         assert time.monotonic() < deadline, f"not within {timeout_s} s"
         time.sleep(pause_s)
-        pause_s = min(1.5 * pause_s, 0.05)  # a condition may cost much more than the pause, here and in the service
+        pause_s = min(1.5 * pause_s, 0.1)  # a condition may cost much more than the pause, here and in the service
