@@ -50,12 +50,12 @@ class Placement:
         load = self.load()
         for bucket, owner in sorted(self.owners.items()):
             source = self._node(node_of(owner))
-            targets = [node for node in able if node is not source]
-            if source is None or not targets:
+            if source is None:
                 continue
-            emptiest = min(targets, key=lambda node: (load[node.name] / node.shards, node.name))
-            if source.is_drained or _is_uneven(load, source, emptiest):
-                return Move(bucket, emptiest.name)
+            others = [node for node in able if node is not source]
+            targets = [node for node in others if source.is_drained or _is_uneven(load, source, node)]
+            if targets:
+                return Move(bucket, min(targets, key=lambda node: (_share_after(load, node), node.name)).name)
         return None
 
     def without_standby(self) -> tuple[str, int] | None:
@@ -75,8 +75,12 @@ class Placement:
 def _is_uneven(load: Mapping[str, int], source: Node, target: Node) -> bool:
     """Return whether a move from `source` to `target` makes their loads more even, by far enough."""
     difference = load.get(source.name, 0) - load.get(target.name, 0)
-    fuller_after = (load.get(target.name, 0) + 1) / target.shards
-    return difference >= UNEVEN and fuller_after < load.get(source.name, 0) / source.shards
+    return difference >= UNEVEN and _share_after(load, target) < load.get(source.name, 0) / source.shards
+
+
+def _share_after(load: Mapping[str, int], target: Node) -> float:
+    """Return the share of the shards of `target` that have a bucket after a move to it."""
+    return (load.get(target.name, 0) + 1) / target.shards
 
 
 def missing_shards(node: Node, running: Collection[str]) -> list[str]:

@@ -1,7 +1,7 @@
 """Where buckets go: off nodes that are drained, from full nodes to empty ones, and never without a standby."""
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dropanchor_service.cluster.watch import node_of
@@ -27,6 +27,7 @@ def placed(nodes: list[Node], **owners: int) -> Placement:
         (placed([A, B, C], a=2, b=2), Move("000", "c")),
         (placed([A, Node("b", 1)], a=3), None),  # b would be fuller than a is
         (placed([A, Node("b", 1)], a=4), None),
+        (placed([A, Node("b", 1), C], a=3, c=1), Move("000", "c")),  # b, the emptiest, would be fuller than a is
         (placed([A, Node("b", 1)], a=3, b=1), None),  # b has no shard that stands by
         (placed([A, Node("b", 4, is_drained=True)], a=3), None),
         (placed([A, Node("b", 4, is_drained=True)], a=3, b=1), Move("003", "a")),
@@ -45,6 +46,7 @@ def test_the_next_move(placement: Placement, move: Move | None) -> None:
     owned=st.lists(st.integers(0, 6), min_size=4, max_size=4),
     drained=st.sets(st.integers(0, 3)),
 )
+@example(shards=[4, 1, 1, 4], owned=[0, 0, 0, 4], drained=set())
 def test_moves_come_to_an_end_and_leave_loads_even(shards: list[int], owned: list[int], drained: set[int]) -> None:
     nodes = [Node(f"n{i}", count, i in drained) for i, count in enumerate(shards)]
     counts = {node.name: min(owned[i], node.shards) for i, node in enumerate(nodes)}
