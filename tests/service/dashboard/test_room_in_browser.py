@@ -102,6 +102,7 @@ def test_six_rows_and_the_buttons_that_save_stay_in_view_and_the_bars_remember_w
         aside = page.page.locator("aside")
         kept = [height(detail), width(aside)]
         assert kept[1] > 1440 * 0.43
+        page.wait_for("location.hash.includes('tag=cart-3')")  # it is written twice a second at most
         page.page.reload()
         page.wait_for("window.dropanchor?.status() === 'live'")
         expect(detail).to_be_visible()
