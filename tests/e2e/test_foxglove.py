@@ -118,8 +118,8 @@ def test_a_viewer_stays_connected_while_the_service_is_away(tmp_path: Path) -> N
             assert viewer.messages == {}
             with running_service("--config", config, "--port", port):
                 viewer.receive_until(lambda: "/scene" in viewer.messages)
-            assert sum("Still trying" in line for line in said) == 1
-            wait_until(lambda: any("answers again" in line for line in said))
+                wait_until(lambda: any("answers again" in line for line in said))
+                assert sum("Still trying" in line for line in said) == 1
     finally:
         bridge.__exit__(None, None, None)
 
