@@ -99,7 +99,7 @@ def encode_with_orjson(answers: Answers) -> bytes:
 def encode_with_msgspec(answers: Answers) -> bytes:
     columns = columns_of(answers.rows(), answers.site, answers.tags, T_NS)
     every = PoseList(T_NS, [Pose(*values) for values in zip(*fields(columns, answers), strict=True)])
-    return msgspec.json.encode(every)
+    return msgspec.json.encode(every, enc_hook=str)  # a hint is a string of another class
 
 
 def fields(columns: PoseColumns, answers: Answers) -> Iterator[Any]:
