@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from dropanchor_service.estimation.fleet.belief.layout import NOISE_LEVELS, ROW, make_workspace
+from dropanchor_service.estimation.fleet.belief.layout import NOISE_LEVELS, ROW
 from dropanchor_service.estimation.fleet.belief.range_noise import learn_lasting, learn_white
+from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 from dropanchor_service.estimation.fleet.frontend.node import NODE
 from dropanchor_service.estimation.fleet.tuning import Tuning
 

@@ -4,10 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from dropanchor_service.estimation.fleet.belief.layout import (
-    N,
-    make_workspace,
-)
+from dropanchor_service.estimation.fleet.belief.layout import N
+from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 from dropanchor_service.estimation.fleet.frontend.node import NODE
 
 STATE = np.array([12.0, 0.7, -2.1, 1.4, 0.2, -0.05, 0.004, 0.08, 0.03, 0.12, -0.06])

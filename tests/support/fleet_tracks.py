@@ -5,9 +5,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dropanchor_service.estimation.columns import ANCHOR, default_settings
-from dropanchor_service.estimation.fleet.belief.layout import BELIEF, ROW, make_workspace
+from dropanchor_service.estimation.fleet.belief.layout import BELIEF, ROW
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.estimation.fleet.belief.step import advance
+from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.frontend.node import MEASURED_HEADING, NODE, RANGE
 from dropanchor_service.estimation.fleet.tuning import Tuning

@@ -173,9 +173,10 @@ def _judge_sensors() -> None:
 
 def warm_up_belief() -> None:
     """Compile the belief of the engine `fleet` alone, with a measurement of no kind."""
-    from dropanchor_service.estimation.fleet.belief.layout import BELIEF, MAX_HYPOTHESES, ROW, make_workspace
+    from dropanchor_service.estimation.fleet.belief.layout import BELIEF, MAX_HYPOTHESES, ROW
     from dropanchor_service.estimation.fleet.belief.pool import make_pool
     from dropanchor_service.estimation.fleet.belief.step import advance
+    from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
     from dropanchor_service.estimation.fleet.frontend.node import NODE
     from dropanchor_service.estimation.fleet.tuning import Tuning
 

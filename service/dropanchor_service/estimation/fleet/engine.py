@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from dropanchor_service.estimation.columns import ANCHOR, Array, PoseBatch, SampleBatch
-from dropanchor_service.estimation.fleet.belief.layout import BELIEF, MAX_HYPOTHESES, ROW, make_workspace
+from dropanchor_service.estimation.fleet.belief.layout import BELIEF, MAX_HYPOTHESES, ROW
 from dropanchor_service.estimation.fleet.belief.pool import fitted, make_pool, of_lanes, release
 from dropanchor_service.estimation.fleet.belief.step import advance
+from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 from dropanchor_service.estimation.fleet.configure import HEIGHT_STD, configure_row
 from dropanchor_service.estimation.fleet.frontend.assembly import assemble_nodes
 from dropanchor_service.estimation.fleet.frontend.batching import MAX_LAG_S

@@ -258,53 +258,6 @@ BELIEF: Final = np.dtype(
     ]
 )
 
-WORKING_HYPOTHESIS: Final = np.dtype(
-    [
-        ("log_weight", np.float64),
-        ("heading_class", np.int32),
-        ("nlos", np.int32),
-        ("reverse", np.int32),
-        ("aligned", np.int32),
-        ("los_bias", np.float64),
-        ("los_bias_var", np.float64),
-        ("mean", np.float64, (N,)),
-        ("weight", np.float64),  # `summary.fill_positions` fills this and what follows
-        ("direction", np.float64, (2,)),  # unit vector from the anchor
-        ("position", np.float64, (2,)),  # m, from the anchor
-        ("position_var", np.float64),  # m^2, without a common rotation about the anchor
-        ("by_weight", np.int32),  # index of the k-th heaviest
-        ("merged", np.bool_),  # into a heavier one
-        ("in_mode", np.bool_),  # a member of the mode under consideration
-        ("assigned", np.bool_),  # to a mode considered before
-        ("cov", np.float64, (N, N)),
-        ("delta", np.float64, (N,)),  # scratch of merging and splitting
-    ],
-    align=True,
-)
-
-SCRATCH: Final = np.dtype(
-    [
-        ("decay", np.float64, (N,)),
-        ("growth", np.float64, (N,)),
-        ("F", np.float64, (4, N)),
-        ("FP", np.float64, (4, N)),
-        ("H", np.float64, (N,)),
-        ("PH", np.float64, (N,)),
-        ("out", np.float64, (3,)),
-        ("mean", np.float64, (5,)),
-        ("cov", np.float64, (3, 3)),
-        ("part", np.float64, (3, 3)),
-        ("share", np.float64, (FAMILIES,)),
-        ("point", np.float64, (3,)),
-        ("lane", np.int64),  # whose free slots of the pool the thread takes
-    ]
-)
-
-# All that one thread works on, as one record: compiled code counts no references to the parts of a record.
-WORKSPACE: Final = np.dtype(
-    [("hypotheses", WORKING_HYPOTHESIS, (WORKING_HYPOTHESES,)), ("scratch", SCRATCH)], align=True
-)
-
 Floats: TypeAlias = npt.NDArray[np.float64]
 Row: TypeAlias = Any  # a record of ROW
 Hypothesis: TypeAlias = Any  # a record of WORKING_HYPOTHESIS
@@ -317,10 +270,3 @@ Rows: TypeAlias = npt.NDArray[np.void]  # ROW (n,)
 Pool: TypeAlias = npt.NDArray[np.void]  # POOL_SLOT (n,)
 Beliefs: TypeAlias = npt.NDArray[np.void]  # BELIEF (n,)
 Anchors: TypeAlias = npt.NDArray[np.void]  # ANCHOR (n,)
-
-
-def make_workspace(lane: int = 0) -> npt.NDArray[np.void]:
-    """Return WORKSPACE (1,): for one thread, with room for the unpacked hypotheses of one row."""
-    workspace = np.zeros(1, WORKSPACE)
-    workspace["scratch"]["lane"] = lane
-    return workspace

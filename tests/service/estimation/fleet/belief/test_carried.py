@@ -30,8 +30,8 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     N,
     R,
     V,
-    make_workspace,
 )
+from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, MEASURED_HEADING, RELATIVE_HEADING
 from dropanchor_service.estimation.fleet.measurement.steps import update_gait_angle, update_step_speed

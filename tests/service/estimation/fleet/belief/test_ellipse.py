@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.fleet.belief.layout import PHI, N, R, make_workspace
+from dropanchor_service.estimation.fleet.belief.layout import PHI, N, R
 from dropanchor_service.estimation.fleet.belief.mixture import normalise
 from dropanchor_service.estimation.fleet.belief.summary import cluster, fill_positions, moments, spread_over_families
+from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 
 DISTANCE, STD = 10.0, 0.1  # m
 REJECTED = 1e-3

@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from dropanchor_service.estimation.fleet.belief.layout import MOUNT, PHI, N, R, make_workspace
+from dropanchor_service.estimation.fleet.belief.layout import MOUNT, PHI, N, R
 from dropanchor_service.estimation.fleet.belief.mixture import merge, normalise
+from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 
 STD = 0.2  # m, of the distance
 

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.fleet.belief.layout import ROW, N, R, make_workspace
+from dropanchor_service.estimation.fleet.belief.layout import ROW, N, R
 from dropanchor_service.estimation.fleet.belief.range_noise import doubt, learn_lasting, learn_white
+from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 from dropanchor_service.estimation.fleet.frontend.node import NODE
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.belief import hypothesis_of

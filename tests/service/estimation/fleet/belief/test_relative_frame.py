@@ -7,9 +7,10 @@ import pytest
 
 from dropanchor_evaluation.product.scores import rotated_onto
 from dropanchor_service.estimation.columns import ANCHOR, State
-from dropanchor_service.estimation.fleet.belief.layout import BELIEF, make_workspace
+from dropanchor_service.estimation.fleet.belief.layout import BELIEF
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.estimation.fleet.belief.step import advance
+from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, RELATIVE_HEADING
 from dropanchor_service.offline.accuracy import nees
 from support.fleet_tracks import CALIBRATED, Drive, drive, rows_of

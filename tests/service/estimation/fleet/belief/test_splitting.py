@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.fleet.belief.births.splitting import curvature, is_curved, is_wide
-from dropanchor_service.estimation.fleet.belief.layout import PHI, ROW, YAW, N, R, V, make_workspace
+from dropanchor_service.estimation.fleet.belief.layout import PHI, ROW, YAW, N, R, V
 from dropanchor_service.estimation.fleet.belief.mixture import angle_variance
+from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 TUNING = Tuning().record()[0]

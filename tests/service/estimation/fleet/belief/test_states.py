@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 
 from dropanchor_service.estimation.columns import State, StateReason
-from dropanchor_service.estimation.fleet.belief.layout import BELIEF, PHI, N, make_workspace
+from dropanchor_service.estimation.fleet.belief.layout import BELIEF, PHI, N
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.estimation.fleet.belief.publish import publish
+from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 from dropanchor_service.estimation.fleet.frontend.node import NO_HEADING
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.belief import STATE, node_of
