@@ -4,6 +4,7 @@ import { send } from "../data/access.js";
 import { api, getJson } from "../data/connection.js";
 import { t, timeText } from "../i18n/language.js";
 import { refusalInForm } from "../i18n/said.js";
+import { revocableLine } from "./revocable_line.js";
 
 /** @typedef {{id: string, name: string, scope: string | null, tag: string | null, expires_ns: number | null}} Key */
 
@@ -57,19 +58,12 @@ export class KeyPanel {
 
   /** @param {Key} key */
   #line({ id, name, scope, tag, expires_ns }) {
-    const line = document.createElement("li");
-    const text = document.createElement("span");
     const what = tag === null ? t(scope === "write" ? "access.word_write" : "access.word_read") : t("access.word_tag", { tag });
-    text.textContent = lineOf(name, what, expires_ns);
-    const revoke = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: t("share.revoke") });
-    revoke.setAttribute("aria-label", t("share.revoke_one", { what: name }));
-    revoke.addEventListener("click", () => this.#attempt(async () => {
+    return revocableLine(lineOf(name, what, expires_ns), name, () => this.#attempt(async () => {
       await send(api(`keys/${id}`), "DELETE", null);
       this.#part("created").hidden = true;
       await this.#refresh();
     }));
-    line.append(text, revoke);
-    return line;
   }
 
   /** @param {() => Promise<void>} act */

@@ -5,6 +5,7 @@ import { addressValues } from "../data/address.js";
 import { api, getJson } from "../data/connection.js";
 import { t, timeText } from "../i18n/language.js";
 import { refusal } from "../i18n/said.js";
+import { revocableLine } from "./revocable_line.js";
 
 /** @typedef {{id: string, name: string, expires_ns: number, tag: string | null, group: string | null}} Share */
 
@@ -67,20 +68,14 @@ export class SharePanel {
 
   /** @param {Share} share */
   #line({ id, name, expires_ns, tag, group }) {
-    const line = document.createElement("li");
-    const text = document.createElement("span");
     const time = timeText(expires_ns / 1e6, { dateStyle: "medium", timeStyle: "short" });
     const what = name || tag || group || t("share.all");
-    text.textContent = t(expires_ns / 1e6 < Date.now() ? "share.expired" : "share.until", { what, time });
-    const revoke = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: t("share.revoke") });
-    revoke.setAttribute("aria-label", t("share.revoke_one", { what }));
-    revoke.addEventListener("click", () => this.#attempt(async () => {
+    const text = t(expires_ns / 1e6 < Date.now() ? "share.expired" : "share.until", { what, time });
+    return revocableLine(text, what, () => this.#attempt(async () => {
       await send(api(`shares/${id}`), "DELETE", null);
       this.#part("created").hidden = true;
       await this.#refresh();
     }));
-    line.append(text, revoke);
-    return line;
   }
 
   /** @param {() => Promise<void>} act */
