@@ -4,7 +4,7 @@ from enum import StrEnum
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from dropanchor_schemas.pose import Hypothesis, Pose
+from dropanchor_schemas.pose import Hypothesis, Phrase, Pose
 
 
 class MeasurementKind(StrEnum):
@@ -55,6 +55,27 @@ class RangeErrors(_Answer):
     lasting_m: float = Field(description="Standard deviation, m, of the error that lasts for seconds.")
 
 
+class UncertaintyCause(StrEnum):
+    """What the largest part of an uncertain place comes from."""
+
+    NORTH = "north"
+    MOUNT = "mount"
+    SPEED = "speed"
+    BEARING = "bearing"
+    RANGES = "ranges"
+    HEIGHT = "height"
+
+
+class Uncertainty(_Answer):
+    """How far the tag may be from its pose along the 95 % ellipse, and what most of it comes from."""
+
+    half_m: float = Field(description="The semi-major axis of the ellipse.")
+    largest: UncertaintyCause
+    largest_m: float = Field(description="What the largest cause alone would make of `half_m`.")
+    text: str = Field(description="The same as a sentence, with what would make the ellipse smaller.")
+    phrase: Phrase = Field(description="That sentence by its code.")
+
+
 class SpeedTrack(_Answer):
     """Speeds of the last minute, in columns. In a very large fleet the history is shorter."""
 
@@ -78,6 +99,9 @@ class Explanation(_Answer):
     speed: SpeedEvidence
     speed_track: SpeedTrack
     height_track: HeightTrack
+    uncertainty: Uncertainty | None = Field(
+        default=None, description="What its ellipse comes from; null where `sigma_parts` of the pose is."
+    )
     innovations: list[Innovation] = Field(description="The most recent innovations, oldest first.")
     range_errors: RangeErrors | None = Field(
         default=None,

@@ -94,6 +94,18 @@ class Hypothesis(_Answer):
     ellipse_95: Ellipse | None = None
 
 
+class SigmaParts(_Answer):
+    """What the uncertainty of a place is made of, m: what knowing each of them, after those before it, would take away.
+    The squares add up to that of `sigma_pos_m`, or of that of `relative_pose`."""
+
+    north_m: float = Field(description="Where north is: the error of the heading, and of what it is measured against.")
+    mount_m: float = Field(description="How the tag is mounted or held: the angle between body x and its course.")
+    speed_m: float = Field(description="How fast it moves.")
+    bearing_m: float = Field(description="In which direction from the anchor it started, and its track since.")
+    ranges_m: float = Field(description="The ranges: along the line to the anchor, without the height.")
+    height_m: float = Field(description="How high it is: what an unknown height changes of the distance.")
+
+
 class RelativePose(_Answer):
     """Where a tag is in a frame of its own, while north is not known: the site frame, turned about the tag's first
     anchor by an unknown angle. The anchor is at its x and y of the site, and the x axis is the first direction of
@@ -154,6 +166,9 @@ class Pose(_Answer):
     ellipse_95: Ellipse | None
     p_mode: float | None = Field(description="Probability that the published mode is the right one.")
     sigma_pos_m: float | None = Field(description="sqrt(Pxx + Pyy) in the site frame, m.")
+    sigma_parts: SigmaParts | None = Field(
+        default=None, description="What `sigma_pos_m` is made of; null where no engine told it, as in the past."
+    )
     sigma_obs_m: float | None = Field(description="Position accuracy that the last 10 s of data alone can reach, m.")
     range_m: float | None = Field(description="Last range that was fused, m.")
     anchor: str | None = Field(description="The anchor of that range.")

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from dropanchor_schemas.pose import HeightSource as HeightName
-from dropanchor_schemas.pose import Pose, PoseFrame
+from dropanchor_schemas.pose import Pose, PoseFrame, SigmaParts
 from dropanchor_schemas.sentences import phrase_of
 from dropanchor_service.answers.columns import REASONS, PoseColumns, ellipse_95
 from dropanchor_service.answers.frames import FRAMES, STATES, OwnFrames
@@ -28,6 +28,8 @@ DECIMALS, FRAME_DECIMALS, FINE_DECIMALS = (
 _AMBIGUOUS: Final = int(State.AMBIGUOUS)  # NumPy compares with an int faster than with an enum
 _HEIGHT_SOURCES: Final = (None, *(HeightName[source.name].value for source in HeightSource))
 COVARIANCE: Final = [[NUMBER] * 3] * 3
+PARTS: Final = tuple(SigmaParts.model_fields)
+_PARTS: Final = dict.fromkeys(PARTS, NUMBER)
 ELLIPSE: Final = {"semi_major_m": NUMBER, "semi_minor_m": NUMBER, "angle_rad": NUMBER}
 
 
@@ -131,6 +133,25 @@ def ellipse_values(major: Array, minor: Array, angle: Array) -> list[dict[str, A
         {"semi_major_m": a, "semi_minor_m": b, "angle_rad": c} if a == a else None
         for a, b, c in zip(major.tolist(), minor.tolist(), angle.tolist(), strict=True)
     ]
+
+
+def _parts_json(columns: PoseColumns) -> JsonPart:
+    numbers = columns.poses["parts"]
+    return JsonPart([null_for(len(PARTS)), _PARTS], _are_told(numbers), (numbers,), (DECIMALS,) * len(PARTS))
+
+
+def _parts(columns: PoseColumns) -> Sequence[Any]:
+    numbers = columns.poses["parts"]
+    told = _are_told(numbers).tolist()
+    return [
+        dict(zip(PARTS, of_pose, strict=True)) if is_told else None
+        for of_pose, is_told in zip(numbers.tolist(), told, strict=True)
+    ]
+
+
+def _are_told(parts: Array) -> Array:
+    sums: Array = parts.sum(axis=1)
+    return (sums > 0.0) & (sums < BEYOND)
 
 
 def _hypotheses_json(columns: PoseColumns) -> JsonPart:
@@ -255,6 +276,7 @@ _TABLE: Final = {
     "angle_rad": number(lambda columns: columns.angle_rad),
     "p_mode": engine_number("p_mode"),
     "sigma_pos_m": engine_number("sigma_pos"),
+    "sigma_parts": PoseField(_parts_json, _parts, _nulls),  # not in frames
     "sigma_obs_m": engine_number("sigma_obs"),
     "range_m": engine_number("range"),
     "anchor": choice(_anchors),

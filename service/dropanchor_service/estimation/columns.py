@@ -89,6 +89,7 @@ POSE = np.dtype(
         ("p_mode", "f8"),
         ("sigma_pos", "f8"),
         ("sigma_obs", "f8"),
+        ("parts", "f8", (6,)),  # of sigma_pos: north, mount, speed, bearing, ranges, height; all 0: not told
     ]
 )
 

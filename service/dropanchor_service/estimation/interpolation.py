@@ -35,6 +35,7 @@ def propagated(pose: Array, t_ns: int) -> Array:
     later["y"] += way * s
     later["heading"] = math.remainder(float(pose["heading"]) + rate * dt, math.tau)
     later["cov"] = F @ pose["cov"] @ F.T + G @ Q @ G.T
+    later["parts"] = 0.0
     later["sigma_pos"] = math.sqrt(later["cov"][0, 0] + later["cov"][1, 1])
     return later
 
@@ -53,6 +54,7 @@ def interpolated(before: Array, after: Array, t_ns: int) -> Array:
         between[name] = (1 - share) * before[name] + share * after[name]
     variance = (1 - share) * before["z_std"] ** 2 + share * after["z_std"] ** 2
     between["z_std"] = math.sqrt(variance + share * (1 - share) * (after["z"] - before["z"]) ** 2)
+    between["parts"] = 0.0
     turn = math.remainder(float(after["heading"]) - float(before["heading"]), math.tau)
     between["heading"] = math.remainder(float(before["heading"]) + share * turn, math.tau)
     between["p_mode"] = np.fmin(before["p_mode"], after["p_mode"])

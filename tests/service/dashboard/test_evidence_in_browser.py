@@ -3,7 +3,7 @@
 import math
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def place() -> Iterator[Place]:
         yield Place(bench, f"http://127.0.0.1:{port}/")
 
 
-def drive(place: Place, tag: str = "cart", hard_gate: bool = False) -> Array:
+def drive(place: Place, tag: str = "cart", hard_gate: bool = False, parts: Sequence[float] = (0.0,) * 6) -> Array:
     """Make a tag come straight from the east at 1 m/s, with ranges to both anchors in turn. Return its INNOVATION."""
     row = place.bench.answers.tags.register(tag).row
     end_ns = time.time_ns()
@@ -47,6 +47,7 @@ def drive(place: Place, tag: str = "cart", hard_gate: bool = False) -> Array:
     poses["row"] = innovations["row"] = row
     poses["state"], poses["reason"], poses["p_mode"] = State.TRACKING, StateReason.RESOLVED, 1.0
     poses["cov"], poses["sigma_pos"] = np.diag([0.04, 0.01, HEADING_SIGMA**2]), 0.22
+    poses["parts"] = parts
     innovations["measured"] = np.add(innovations["predicted"], innovations["innovation"])
     innovations["S"] = 0.1**2
     innovations["fused"] = [i not in REFUSED for i in range(COUNT)]
@@ -192,3 +193,24 @@ def test_the_panel_can_be_focused_and_scrolled_with_the_keyboard(chromium: Brows
         page.wait_for("document.getElementById('detail').scrollTop > 50")
         label = page.page.locator("[data-plot='range'] svg").get_attribute("aria-label")
         assert label == "Ranges: 60, of which 2 refused"
+
+
+def test_the_panel_names_what_the_ellipse_comes_from_and_what_would_shrink_it(chromium: Browser, place: Place) -> None:
+    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+        drive(place, parts=(0.2, 0.05, 0.0, 0.07, 0.04, 0.0))
+        select(page)
+        box = page.page.locator("[data-part='uncertainty']")
+        box.wait_for()
+        assert box.locator("p").inner_text() == (
+            "± 0.5 m, of which 0.4 m come from where north is. Set where it starts and looks (`start`)."
+        )
+        names = [line.split("\n")[0] for line in box.locator("li").all_inner_texts()]
+        assert names == ["North", "Start", "Mounting", "Ranges"]
+        assert page.errors == []
+
+
+def test_an_engine_that_tells_no_parts_shows_none(chromium: Browser, place: Place) -> None:
+    with watched_page(chromium, place.url) as page:
+        drive(place)
+        select(page)
+        assert page.page.locator("[data-part='uncertainty']").is_hidden()

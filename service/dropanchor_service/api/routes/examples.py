@@ -27,6 +27,14 @@ POSE: dict[str, Any] = {
     "ellipse_95": _ELLIPSE,
     "p_mode": 0.998,
     "sigma_pos_m": 0.115,
+    "sigma_parts": {
+        "north_m": 0.06,
+        "mount_m": 0.03,
+        "speed_m": 0.02,
+        "bearing_m": 0.076,
+        "ranges_m": 0.05,
+        "height_m": 0.01,
+    },
     "sigma_obs_m": 0.31,
     "range_m": 3.64,
     "anchor": "1",
@@ -46,6 +54,23 @@ EXPLANATION: dict[str, Any] = {
         "t_ns": [1_799_999_999_750_000_000, 1_800_000_000_000_000_000],
         "z": [1.1, 1.1],
         "z_std_m": [0.15, 0.15],
+    },
+    "uncertainty": {
+        "half_m": 0.24,
+        "largest": "bearing",
+        "largest_m": 0.16,
+        "text": "± 0.2 m, of which 0.2 m come from the direction in which it started. A second anchor would tell.",
+        "phrase": {
+            "code": "uncertainty",
+            "values": {
+                "half": "0.2",
+                "part": "0.2",
+                "cause": "the direction in which it started",
+                "cause.code": "uncertain.bearing",
+                "cure": "A second anchor would tell.",
+                "cure.code": "cure.anchor",
+            },
+        },
     },
     "innovations": [
         {

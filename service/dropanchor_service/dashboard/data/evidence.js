@@ -25,6 +25,7 @@ const RECENT_S = 5;
  * @property {{t_ns: number[], z: (number | null)[], z_std_m: (number | null)[]}} height_track
  * @property {Innovation[]} innovations oldest first
  * @property {{white_m: number, lasting_m: number} | null} range_errors
+ * @property {{largest: string, half_m: number, text: string, phrase: import("../i18n/said.js").Phrase} | null} uncertainty
  * @property {number} refused
  * @property {Record<string, number>} samples
  * @property {Record<string, number>} rejected

@@ -2,6 +2,7 @@
 
 import { drawAnchors, drawGrid, drawRings, drawScaleBar } from "./draw_site.js";
 import { drawEvidence } from "./draw_evidence.js";
+import { drawTurn } from "./draw_turn.js";
 import { drawEllipses, drawGhosts, drawRangeRings, drawTrails } from "./draw_doubt.js";
 import { Labels } from "./draw_labels.js";
 import { drawColours, drawElsewhere, drawMarkers, drawSelection } from "./draw_tags.js";
@@ -275,6 +276,7 @@ export class LiveMap extends EventTarget {
     drawRangeRings(scene, isShown);
     if (density) drawDensity(scene);
     else drawEllipses(scene);
+    drawTurn(scene, this.evidence.of(this.choice.selected));
     drawEvidence(scene, this.evidence.of(this.choice.selected));
     for (const tag of this.choice.tags.slice(0, MOST_TRACKS)) {
       const track = this.trackOf(tag);

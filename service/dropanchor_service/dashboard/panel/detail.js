@@ -10,6 +10,7 @@ import { clockText, healthTexts } from "./care.js";
 import { HeightPlot, heightsOfMinute } from "./height_plot.js";
 import { hintOf } from "./hint.js";
 import { Plots } from "./plots.js";
+import { showUncertainty } from "./uncertainty.js";
 import { symbol } from "../map/symbols.js";
 
 /** @typedef {import("../data/fleet.js").Fleet} Fleet */
@@ -69,6 +70,7 @@ export class Detail {
     const row = this.fleet.row(this.choice.selected);
     if (row < 0) return;
     this.plots.update(this.#explanation);
+    showUncertainty(this.#part("uncertainty"), this.#explanation);
     const status = this.#explanation ?? this.roster.of(this.fleet.names[row]);
     countsInto(this.#part("samples"), t("tag.used"), status?.samples);
     countsInto(this.#part("rejected"), t("tag.rejected"), status?.rejected);

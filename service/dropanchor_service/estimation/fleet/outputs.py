@@ -8,6 +8,7 @@ import numpy as np
 from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, Array, MeasurementKind
 from dropanchor_service.estimation.fleet.belief.layout import Anchors, Beliefs, Pool, Rows
 from dropanchor_service.estimation.fleet.belief.modes import list_modes
+from dropanchor_service.estimation.fleet.belief.parts import PARTS
 from dropanchor_service.estimation.fleet.belief.states import AMBIGUOUS
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.event import PRESSURE_EVENT
@@ -111,6 +112,8 @@ def _write_poses(nodes: Nodes, beliefs: Beliefs, poses: Array) -> int:
         pose.p_mode = belief.p_mode if known else np.nan
         pose.sigma_pos = belief.sigma_pos if known else np.nan
         pose.sigma_obs = belief.sigma_obs if known else np.nan
+        for i in range(PARTS):
+            pose.parts[i] = belief.parts[i] if known else np.nan
         for i in range(3):
             for j in range(3):
                 pose.cov[i, j] = belief.cov[i, j] if known else np.nan

@@ -245,6 +245,7 @@ BELIEF: Final = np.dtype(
         ("p_mode", np.float64),
         ("sigma_pos", np.float64),
         ("sigma_obs", np.float64),
+        ("parts", np.float64, (6,)),  # of sigma_pos, in the order of `parts`
         ("innovation", np.float64),  # of the likeliest hypothesis, in the units of the measurement
         ("innovation_variance", np.float64),  # 0: no measurement met a belief
         ("p_outlier", np.float64),

@@ -37,7 +37,7 @@ def list_modes(row: Row, pool: Pool, anchors: Anchors, space: Workspace, modes: 
         if weight < LIGHTEST:
             return n
         moments(work, count, head, scratch)
-        widen_by_reference(row, mean, cov)
+        widen_by_reference(row, scratch)
         for h in range(count):
             work[h].assigned |= work[h].in_mode
         mode, anchor = modes[n], anchors[row.anchor]

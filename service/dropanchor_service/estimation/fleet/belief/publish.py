@@ -5,6 +5,7 @@ from typing import Final
 
 from dropanchor_service.estimation.fleet.belief.layout import Anchors, Belief, Floats, Hypotheses, Row, Scratch
 from dropanchor_service.estimation.fleet.belief.observability import predict_information, sigma_obs
+from dropanchor_service.estimation.fleet.belief.parts import fill_parts
 from dropanchor_service.estimation.fleet.belief.rigidity import is_askew
 from dropanchor_service.estimation.fleet.belief.states import (
     AMBIGUOUS,
@@ -55,7 +56,7 @@ def publish(
     r = math.sqrt(mean[0] ** 2 + mean[1] ** 2)
     _update_information(row, node, mean, t)
     belief.sigma_obs = sigma_obs(row.publication.information)
-    widen_by_reference(row, mean, cov)
+    widen_by_reference(row, scratch)
     _update_resolved(row, node, p_mode, relative, r, t)
     undecided = row.walk.carried == 0 and (node.stepping == 1 or is_askew(row))
     _set_state(row, _has_rivals(row, p_mode), undecided, relative, _sigma_pos(cov), r, work[head].nlos == 1)
@@ -63,13 +64,14 @@ def publish(
         spread_over_all(work, count, scratch)
     else:
         spread_over_families(work, count, head, scratch, t.class_rejected_weight)
-    widen_by_reference(row, mean, cov)
+    widen_by_reference(row, scratch)
     spread = t.walk_spread if row.walk.carried == 1 else 1.0
     for i in range(3):
         for j in range(3):
             belief.cov[i, j] = spread * cov[i, j]
     belief.p_mode = min(p_mode, 1.0)
     belief.sigma_pos = math.sqrt(spread) * _sigma_pos(cov)
+    fill_parts(row, anchor, scratch, belief)
     belief.hypotheses, belief.relative = count, 1 - row.heading.in_site_frame
 
 

@@ -19,6 +19,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     V,
 )
 from dropanchor_service.estimation.fleet.belief.mixture import angle_variance, best_of, is_mounted_otherwise
+from dropanchor_service.estimation.fleet.belief.parts import add_causes, forget_causes, turn_causes
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
@@ -74,10 +75,12 @@ def add_reference_variance(cov: Floats, x: float, y: float, variance: float) -> 
 
 
 @njit(nogil=True)
-def widen_by_reference(row: Row, mean: Floats, cov: Floats) -> None:
+def widen_by_reference(row: Row, scratch: Scratch) -> None:
     """Widen an ellipse of the site frame whose start was found: it is known only as well as the heading reference."""
     if row.start.known == 0 and row.heading.in_site_frame == 1:
-        add_reference_variance(cov, mean[0], mean[1], row.settings.reference_std**2)
+        variance = row.settings.reference_std**2
+        add_reference_variance(scratch.cov, scratch.mean[0], scratch.mean[1], variance)
+        turn_causes(scratch, variance)
 
 
 @njit(nogil=True)
@@ -132,7 +135,9 @@ def moments(work: Hypotheses, count: int, head: int, scratch: Scratch) -> float:
         one = work[h]
         if one.in_mode:
             w, s = one.weight, one.mean
-            _add_moments(one, w, x0, y0, course0, scratch)
+            _add_spread(one, w, x0, y0, course0, scratch)
+            for i in range(3):
+                mean[i] += w * scratch.point[i]
             mean[3] += w * s[V]
             mean[4] += w * wrap(s[YAW] - yaw0)
             spread += w * (one.position_var + _from_head(first.mean, s))
@@ -150,14 +155,13 @@ def moments(work: Hypotheses, count: int, head: int, scratch: Scratch) -> float:
 
 
 @njit(nogil=True)
-def _add_moments(one: Hypothesis, w: float, x0: float, y0: float, course0: float, scratch: Scratch) -> None:
-    """Add w times the first and second moments of a hypothesis about (x0, y0, course0) to scratch."""
-    mean, cov, part, point = scratch.mean, scratch.cov, scratch.part, scratch.point
+def _add_spread(one: Hypothesis, w: float, x0: float, y0: float, course0: float, scratch: Scratch) -> None:
+    """Add w times the second moments of a hypothesis about (x0, y0, course0) to scratch.cov. Set scratch.point."""
+    cov, part, point = scratch.cov, scratch.part, scratch.point
     point[0], point[1] = one.position[0] - x0, one.position[1] - y0
     point[2] = wrap(course_of(one.mean) - course0)
     planar_covariance_towards(one.direction[0], one.direction[1], one.mean[R], one.cov, part)
     for i in range(3):
-        mean[i] += w * point[i]
         for j in range(3):
             cov[i, j] += w * (part[i, j] + point[i] * point[j])
 
@@ -171,14 +175,25 @@ def _from_head(head: Floats, s: Floats) -> float:
 
 
 @njit(nogil=True)
+def _forget_spread(scratch: Scratch) -> None:
+    scratch.cov[:] = 0.0
+    forget_causes(scratch)
+
+
+@njit(nogil=True)
+def _add_about_mean(one: Hypothesis, w: float, scratch: Scratch) -> None:
+    """Add w times the second moments of a hypothesis about scratch.mean to scratch, and those of their causes."""
+    mean = scratch.mean
+    _add_spread(one, w, mean[0], mean[1], mean[2], scratch)
+    add_causes(one, w, scratch)
+
+
+@njit(nogil=True)
 def spread_over_all(work: Hypotheses, count: int, scratch: Scratch) -> None:
     """Set scratch.cov to that of all hypotheses about scratch.mean: an ellipse that also holds the other modes."""
-    mean, cov = scratch.mean, scratch.cov
-    x, y, course = mean[0], mean[1], mean[2]
-    cov[:] = 0.0
+    _forget_spread(scratch)
     for h in range(count):
-        _add_moments(work[h], work[h].weight, x, y, course, scratch)
-    mean[0], mean[1], mean[2] = x, y, course
+        _add_about_mean(work[h], work[h].weight, scratch)
 
 
 @njit(nogil=True)
@@ -194,10 +209,9 @@ def spread_over_families(work: Hypotheses, count: int, head: int, scratch: Scrat
     Each family counts the same. Ranges tell late whether a reference is exact, or whether a tag is mounted straight;
     until then an ellipse must not rest on the prior that it mostly is.
     """
-    mean, share = scratch.mean, scratch.share
-    x, y, course = mean[0], mean[1], mean[2]
+    share = scratch.share
     share[:] = 0.0
-    scratch.cov[:] = 0.0
+    _forget_spread(scratch)
     for h in range(count):
         share[_family(work[h], work[head])] += work[h].weight
     families = 0
@@ -206,8 +220,7 @@ def spread_over_families(work: Hypotheses, count: int, head: int, scratch: Scrat
     for h in range(count):
         of_family = share[_family(work[h], work[head])]
         if of_family > rejected_weight:
-            _add_moments(work[h], work[h].weight / (of_family * families), x, y, course, scratch)
-    mean[0], mean[1], mean[2] = x, y, course
+            _add_about_mean(work[h], work[h].weight / (of_family * families), scratch)
 
 
 @njit(nogil=True)

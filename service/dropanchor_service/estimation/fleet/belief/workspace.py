@@ -48,6 +48,8 @@ SCRATCH: Final = np.dtype(
         ("part", np.float64, (3, 3)),
         ("share", np.float64, (FAMILIES,)),
         ("point", np.float64, (3,)),
+        ("causes", np.float64, (4, 4)),  # `parts` fills this and `radial`
+        ("radial", np.float64, (2,)),
         ("lane", np.int64),  # whose free slots of the pool the thread takes
     ]
 )
