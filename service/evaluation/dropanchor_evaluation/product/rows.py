@@ -6,7 +6,7 @@ from fnmatch import fnmatchcase
 from itertools import product
 from pathlib import Path
 
-from dropanchor_evaluation.product.disturbances import MOUNTS, RANGE_ERRORS
+from dropanchor_evaluation.product.disturbances import FIELD, HEADINGS, MOUNTS, PATHS, RANGE_ERRORS
 from dropanchor_evaluation.recordings import recordings_in
 
 DEVELOPMENT_SEEDS = range(5000, 6000)
@@ -70,8 +70,13 @@ def simulated_rows() -> list[Row]:
     fast = [(motion + FAST, "scalar", "everything") for motion in ("P", "S5", "M5")]
     bare = [(motion, BARE, "nothing") for motion in (*VEHICLES[1:], "walk-hand")]
     noisy = [(f"{motion}+{what}", "9-axis", "nothing") for motion in ("S5", "C5") for what in RANGE_ERRORS]
+    hard = [
+        *((f"S5+{what}", "scalar", "everything") for what in PATHS),
+        *((f"S5+{what}", "scalar", "nothing") for what in HEADINGS),
+        *((f"S5+{what}", "9-axis", "nothing") for what in FIELD if what != "hcorr"),  # that is of platforms' headings
+    ]
     turned = [(f"{motion}+{what}", "9-axis", "nothing") for motion in TURNED for what in MOUNTS]
-    return [Row(*what, start) for what in (*fast, *full, *loose, *bare, *noisy, *turned) for start in STARTS]
+    return [Row(*what, start) for what in (*fast, *full, *loose, *bare, *noisy, *hard, *turned) for start in STARTS]
 
 
 def recorded_rows(data: Path) -> list[Row]:

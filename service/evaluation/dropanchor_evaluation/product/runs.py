@@ -18,6 +18,7 @@ from dropanchor_service.offline.replay import NS_PER_S, anchors_of, truth_of
 from dropanchor_service.offline.replay import samples_of as recorded_samples
 from dropanchor_tag_client.recording import Recording, RecordingError, read_recording
 from dropanchor_tag_client.simulator.ground import smooth
+from dropanchor_tag_client.simulator.perturbations import perturbed
 from dropanchor_tag_client.simulator.sensors import SensorModels, calibrated, preset
 from dropanchor_tag_client.simulator.simulation import Simulation, simulate
 from dropanchor_tag_client.simulator.walking import simulate_walk, walking_sensors
@@ -86,6 +87,8 @@ def sensor_models(row: Row) -> SensorModels:
         return calibrated(preset("paper", range_hz=IMU_HZ, imu_hz=IMU_HZ))
     models = preset("real", range_hz=RANGE_HZ, imu_hz=IMU_HZ)
     models = models if row.sensors == BARE else calibrated(models)
+    if row.disturbance in disturbances.FIELD:
+        models = perturbed(models, row.disturbance)
     return smooth(models) if row.scenario == "rolling" else models
 
 

@@ -50,7 +50,7 @@ MEASUREMENTS = (
         "b_range as before the loss",
         "1 s",
         "6",
-        "replay nlos, hanyang_nlosA2",
+        "S5+nlosburst/*, replay nlos",
         37,
     ),
     Birth(
@@ -92,7 +92,7 @@ MEASUREMENTS = (
         "b_range",
         "at each jump",
         "6",
-        "replay nlos, hanyang_nlosA2",
+        "S5+nlosburst/*, replay nlos",
         37,
     ),
     Birth(
@@ -106,7 +106,7 @@ MEASUREMENTS = (
         "b_range as before the loss",
         "at each jump",
         "6",
-        "replay nlos, hanyang_nlosA2",
+        "S5+nlosburst/*, replay nlos",
         37,
     ),
     Birth(
@@ -120,7 +120,7 @@ MEASUREMENTS = (
         "b_range is measured as before the loss",
         "each range",
         "none",
-        "replay nlos, hanyang_nlosA2",
+        "S5+nlosburst/*, replay nlos",
         37,
     ),
     Birth(
