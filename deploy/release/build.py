@@ -3,15 +3,15 @@
 It builds twice and refuses to go on when the two differ.
 """
 
-import os
 import shutil
-import subprocess
 import sys
 import tarfile
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from release.hatch import hatch
+from release.kernels import build_kernels
 from release.licences import NAME as LICENCES
 from release.licences import page
 from release.needs import packages
@@ -20,10 +20,6 @@ from release.staging import FOLDERS, changed_files, last_commit_s, package_of, s
 from release.version import ROOT, version
 
 CHECKSUMS = "SHA256SUMS"
-
-
-class BuildError(Exception):
-    """The build backend failed. The message is what it wrote."""
 
 
 class DifferentBuildsError(Exception):
@@ -47,6 +43,10 @@ def build(into: Path) -> None:
     (into / f"dropanchor-{version()}.cdx.json").write_text(bill, encoding="utf-8")
     for name in ("LICENSE", "constraints.txt"):
         shutil.copyfile(ROOT / name, into / name)
+    _write_checksums(into)
+
+
+def _write_checksums(into: Path) -> None:
     (into / CHECKSUMS).write_text("".join(f"{sum_}  {name}\n" for name, sum_ in checksums(into).items()))
 
 
@@ -58,20 +58,11 @@ def _build_distribution(folder: str, into: Path, time_s: int) -> Path:
         stage(folder, staged)
         if folder == "service":
             shutil.copyfile(into / LICENCES, staged / LICENCES)
-        _hatch("sdist", staged, into, time_s)
+        hatch("sdist", staged, into, time_s)
         with tarfile.open(into / f"{name}.tar.gz") as archive:
             archive.extractall(unpacked, filter="data")
-        _hatch("wheel", unpacked / name, into, time_s)
+        hatch("wheel", unpacked / name, into, time_s)
     return into / f"{name}-py3-none-any.whl"
-
-
-def _hatch(target: str, folder: Path, into: Path, time_s: int) -> None:
-    """Build in this environment, whose versions constraints.txt fixes. It needs no network."""
-    words = [sys.executable, "-m", "hatchling", "build", "--target", target, "--directory", str(into.absolute())]
-    environment = os.environ | {"SOURCE_DATE_EPOCH": str(time_s)}
-    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise BuildError(f"{folder}: {done.stderr}")
 
 
 def checksums(folder: Path) -> dict[str, str]:
@@ -89,6 +80,9 @@ def main(folder: str) -> None:
         different = sorted({name for name, _ in checksums(into).items() ^ checksums(again).items()})
     if different:
         raise DifferentBuildsError(f"two builds differ in {', '.join(different)}: did a file change meanwhile?")
+    if build_kernels(into) is None:
+        print("No kernels are added: this processor belongs to no family that is known.", file=sys.stderr)
+    _write_checksums(into)
     print((into / CHECKSUMS).read_text(), end="")
     print(f"{folder} holds Dropanchor {version()}, built twice with the same result.")
     if changed_files():

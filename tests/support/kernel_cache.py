@@ -10,7 +10,6 @@ import hashlib
 import os
 import subprocess
 import sys
-from importlib.metadata import version
 from pathlib import Path
 
 from support.commands import environment
@@ -31,6 +30,9 @@ algorithm1(np.arange(2.0), np.zeros(2), np.ones(2), (1.0, 0.0, 0.0), TUNED)
 
 def use_cache_of_these_sources() -> None:
     """Set NUMBA_CACHE_DIR for this process and its children, unless it is set already."""
+    from dropanchor_service.runtime.kernel_cache import use_processor_family
+
+    use_processor_family()
     package = ROOT / "service" / "dropanchor_service"
     sources = [
         source
@@ -54,10 +56,10 @@ def compile_once() -> None:
 
 
 def _mark(what: str) -> Path:
-    """Return the file that says that this is done. numba compiles again for another version or sources written anew."""
-    from dropanchor_service.runtime.kernel_cache import sources_stamp
+    """Return the file that says that this is done."""
+    from dropanchor_service.runtime.kernel_cache import mark_of
 
-    return Path(os.environ["NUMBA_CACHE_DIR"]) / f"{what}-{version('numba')}-{sources_stamp()}"
+    return mark_of(Path(os.environ["NUMBA_CACHE_DIR"]), what)
 
 
 def prepare() -> None:

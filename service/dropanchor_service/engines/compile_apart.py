@@ -2,14 +2,13 @@
 
 import logging
 import os
-import platform
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
 from dropanchor_service.engines.warm_up import ESTIMATOR, PROGRESS_S, CompilationProgress, how_often, where_kept
-from dropanchor_service.runtime.kernel_cache import VARIABLE, sources_stamp
+from dropanchor_service.runtime.kernel_cache import VARIABLE, mark_of
 
 _log = logging.getLogger(__name__)
 
@@ -68,15 +67,5 @@ def _is_writable(folder: Path) -> bool:
 
 
 def _mark() -> Path | None:
-    """Return the file that says that the cache is full.
-
-    numba compiles again for another version or processor, and for sources that were moved or written anew.
-    """
     folder = os.environ.get(VARIABLE)
-    if folder is None:
-        return None
-    import numba
-    from llvmlite.binding import get_host_cpu_name
-
-    name = f"complete-{numba.__version__}-{platform.python_version()}-{get_host_cpu_name()}-{sources_stamp()}"
-    return Path(folder) / name
+    return None if folder is None else mark_of(Path(folder))

@@ -9,13 +9,17 @@ import fcntl
 import hashlib
 import logging
 import os
+import platform
 import shutil
 import stat
 import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from importlib.metadata import version
 from pathlib import Path
+
+from dropanchor_service.runtime.shipped_kernels import CPU, FEATURES, copy_shipped, family, made_for, shipped
 
 VARIABLE = "NUMBA_CACHE_DIR"
 KERNEL_SOURCES = ("estimation", "ingest/kernels", "answers/kernels", "zones")
@@ -31,14 +35,25 @@ def sources_digest() -> str:
     return hashlib.sha256(b"".join(source.read_bytes() for source in _sources())).hexdigest()[:16]
 
 
-def sources_stamp() -> str:
-    """Return a digest of where the sources of the kernels are and when each was written."""
-    stamps = [(str(source), source.stat().st_mtime_ns) for source in _sources()]
-    return hashlib.sha256(repr(stamps).encode()).hexdigest()[:8]
+def mark_of(folder: Path, what: str = "complete") -> Path:
+    """Return the file that says that the cache in a folder is full, or something else of it.
+
+    numba compiles again for another version or processor, for other sources, and for sources that were moved.
+    """
+    if (processor := os.environ.get(CPU)) is None:
+        from llvmlite.binding import get_host_cpu_name
+
+        processor = get_host_cpu_name()
+    place = hashlib.sha256(str(_package()).encode()).hexdigest()[:8]
+    return folder / f"{what}-{version('numba')}-{platform.python_version()}-{processor}-{sources_digest()}-{place}"
+
+
+def _package() -> Path:
+    return Path(__file__).parents[1]
 
 
 def _sources() -> list[Path]:
-    return sorted(source for name in KERNEL_SOURCES for source in (Path(__file__).parents[1] / name).rglob("*.py"))
+    return sorted(source for name in KERNEL_SOURCES for source in (_package() / name).rglob("*.py"))
 
 
 def use_kernel_cache(data_dir: Callable[[], Path | None] = lambda: None) -> None:
@@ -46,10 +61,31 @@ def use_kernel_cache(data_dir: Callable[[], Path | None] = lambda: None) -> None
 
     data_dir: returns the data folder of the service. It has the cache where there is no home.
     """
+    use_processor_family()
     if VARIABLE in os.environ:
         return
     name = f"kernels-{sources_digest()}"
-    os.environ[VARIABLE] = str(_in_home(name) or _in_data(data_dir(), name) or _temporary())
+    folder = _in_home(name) or _in_data(data_dir(), name) or _temporary()
+    os.environ[VARIABLE] = str(folder)
+    _take_shipped(folder)
+
+
+def use_processor_family() -> None:
+    """Let numba compile for the family of this processor, unless the environment says for what."""
+    if CPU not in os.environ and (found := family()) is not None:
+        os.environ[CPU] = found
+        os.environ[FEATURES] = ""  # what the family has, and nothing else of this processor
+
+
+def _take_shipped(folder: Path) -> None:
+    """Fill an empty cache with kernels that were compiled elsewhere, where they are for this process."""
+    if CPU not in os.environ or shipped() is None or (mark := mark_of(folder)).exists():
+        return
+    try:
+        if copy_shipped(folder, made_for(sources_digest(), os.environ[CPU]), _package()):
+            mark.touch()
+    except OSError as error:
+        _log.warning("the kernels of the installation could not be copied (%s): they are compiled", error)
 
 
 def is_kept() -> bool:

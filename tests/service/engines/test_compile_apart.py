@@ -10,7 +10,7 @@ import pytest
 from dropanchor_service.engines.compile_apart import compile_apart
 from dropanchor_service.engines.warm_up import CompilationProgress
 from dropanchor_service.runtime import kernel_cache
-from dropanchor_service.runtime.kernel_cache import VARIABLE
+from dropanchor_service.runtime.kernel_cache import VARIABLE, mark_of
 from support.kernel_cache import compile_once
 from support.service import environment
 
@@ -72,16 +72,19 @@ def test_a_cache_that_cannot_be_written_is_not_filled(
     assert caplog.messages == []
 
 
-def test_sources_that_were_moved_or_written_anew_are_compiled_apart_again(
+def test_a_cache_is_full_for_one_place_and_one_processor_and_for_the_same_sources_written_anew(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """numba compares path and time of a source. A cache that is full for other ones would be filled in the service."""
+    """numba finds compiled code by the folder of a source, and compares what the source says."""
     package = Path(kernel_cache.__file__).parents[1]
     for name in kernel_cache.KERNEL_SOURCES:
         shutil.copytree(package / name, tmp_path / name)
-    digest, here = kernel_cache.sources_digest(), kernel_cache.sources_stamp()
+    here = mark_of(tmp_path)
     monkeypatch.setattr(kernel_cache, "__file__", str(tmp_path / "runtime" / "kernel_cache.py"))
-    moved = kernel_cache.sources_stamp()
+    moved = mark_of(tmp_path)
     os.utime(next((tmp_path / "zones").glob("*.py")), (1, 1))
-    assert len({here, moved, kernel_cache.sources_stamp()}) == 3
-    assert kernel_cache.sources_digest() == digest
+    assert mark_of(tmp_path) == moved != here
+    monkeypatch.setenv("NUMBA_CPU_NAME", "another")
+    assert mark_of(tmp_path) != moved
+    monkeypatch.undo()
+    assert mark_of(tmp_path) == here
