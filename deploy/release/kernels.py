@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from dropanchor_service.runtime import kernel_cache
 from dropanchor_service.runtime.shipped_kernels import PACKAGE, collect, family, made_for
 from release.hatch import hatch
-from release.staging import last_commit_s
+from release.staging import FOLDERS, last_commit_s, stage
 from release.version import ROOT, version
 
 PROJECT = """
@@ -49,11 +49,13 @@ DOC = (
 )
 
 
-def compile_kernels(into: Path) -> Path:
-    """Compile all kernels from the work tree. Return the folder of the cache."""
-    environment = os.environ | {kernel_cache.VARIABLE: str(into)}
-    subprocess.run([sys.executable, "-m", "dropanchor_service", "compile"], check=True, env=environment)
-    return into
+def compile_kernels(sources: Path, into: Path) -> None:
+    """Compile all kernels of a folder with the staged distributions, whose place the compiled code names."""
+    for folder in FOLDERS:
+        stage(folder, sources / folder)
+    paths = os.pathsep.join(str(sources / folder) for folder in FOLDERS)
+    environment = os.environ | {kernel_cache.VARIABLE: str(into), "PYTHONPATH": paths}
+    subprocess.run([sys.executable, "-m", "dropanchor_service", "compile"], check=True, env=environment, cwd=sources)
 
 
 def build_kernels(into: Path) -> Path | None:
@@ -65,8 +67,9 @@ def build_kernels(into: Path) -> Path | None:
     python, numba = f"{sys.version_info[0]}.{sys.version_info[1]}", version_of("numba")
     tag = f"cp{python.replace('.', '')}-none-linux_x86_64"
     with TemporaryDirectory() as place:
-        cache, staged = compile_kernels(Path(place) / "cache"), Path(place) / "staged"
-        package = ROOT / "service" / "dropanchor_service"
+        sources, cache, staged = (Path(place) / name for name in ("sources", "cache", "staged"))
+        compile_kernels(sources, cache)
+        package = sources / "service" / "dropanchor_service"
         staged.mkdir()
         collect(cache, staged / PACKAGE, made_for(kernel_cache.sources_digest(), processor), package)
         (staged / PACKAGE / "__init__.py").write_text(DOC)

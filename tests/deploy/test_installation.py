@@ -182,6 +182,30 @@ def test_the_demo_shows_poses_and_writes_only_into_the_cache(installed: Installa
     assert kernels.name.startswith("kernels-")
 
 
+def test_with_the_kernels_the_first_start_compiles_nothing(installed: Installation) -> None:
+    """The distribution lies in a folder of its own, so that the other tests go on without it."""
+    wheels = list(DIST.glob("dropanchor_kernels-*.whl"))
+    if not wheels:
+        pytest.skip("this release has no kernels: the processor that built it belongs to no family that is known")
+    kernels, home = installed.folder / "kernels", installed.cache / "another"
+    python = str(installed.folder / "venv" / "bin" / "python")
+    install = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", "--target"]
+    subprocess.run([*install, str(kernels), str(wheels[0])], check=True, env=without_paths())
+    subprocess.run(["chmod", "-R", "a-w,a+rX", str(kernels)], check=True)
+    url = f"http://127.0.0.1:{free_port()}"
+    words = ("dropanchor", "demo", "--port", url.rpartition(":")[2], "--zenoh-listen", free_endpoint())
+    began_s = time.monotonic()
+    process = installed.start(*words, XDG_CACHE_HOME=str(home), PYTHONPATH=str(kernels))
+    with running(process):
+        wait_until(lambda: status(f"{url}/api/v1/health/ready") == 200, 240.0)
+        wait_until(lambda: len(httpx.get(f"{url}/api/v1/poses", trust_env=False).json()["poses"]) > 0, 60.0)
+        print(f"\nfirst start with the kernels: poses after {time.monotonic() - began_s:.1f} s")
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=60.0)
+    assert process.returncode == 0
+    assert "compil" not in output
+
+
 def test_without_a_home_the_data_folder_keeps_the_compiled_estimator(installed: Installation) -> None:
     """What the demo has compiled is moved there, so this start finds it: compiling once is enough for both."""
     (kernels,) = (installed.cache / "dropanchor").iterdir()

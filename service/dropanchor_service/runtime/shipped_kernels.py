@@ -55,7 +55,7 @@ def copy_shipped(into: Path, needs: str, sources: Path) -> bool:
         return False
     for folder, name in _folders(sources):
         if (origin / name).is_dir():
-            shutil.copytree(origin / name, into / _name_in_cache(folder), dirs_exist_ok=True)
+            _copy_files(origin / name, into / _name_in_cache(folder))
     return True
 
 
@@ -64,8 +64,15 @@ def collect(cache: Path, into: Path, needs: str, sources: Path) -> None:
     into.mkdir(parents=True)
     for folder, name in _folders(sources):
         if (cache / _name_in_cache(folder)).is_dir():
-            shutil.copytree(cache / _name_in_cache(folder), into / name)
+            _copy_files(cache / _name_in_cache(folder), into / name)
     (into / MADE_FOR).write_text(needs)
+
+
+def _copy_files(origin: Path, into: Path) -> None:
+    """Copy the files of a folder without its permissions: an installation is often read-only, and a cache is not."""
+    into.mkdir(parents=True, exist_ok=True)
+    for file in origin.iterdir():
+        shutil.copyfile(file, into / file.name)
 
 
 def _folders(sources: Path) -> Iterator[tuple[Path, str]]:

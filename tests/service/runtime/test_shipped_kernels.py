@@ -37,6 +37,8 @@ def distribution(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.parent.mkdir()
     collect(Path(os.environ[VARIABLE]), folder, made_for(sources_digest(), family()), SOURCES)
     (folder / "__init__.py").touch()
+    for place in (*folder.iterdir(), folder):  # as an administrator installs it
+        place.chmod(0o555 if place.is_dir() else 0o444)
     monkeypatch.syspath_prepend(str(folder.parent))
     return folder
 
@@ -62,6 +64,7 @@ def test_with_the_distribution_nothing_is_compiled(distribution: Path, tmp_path:
 def test_kernels_for_something_else_are_not_used(distribution: Path, tmp_path: Path, part: str) -> None:
     needs = made_for(sources_digest(), family())
     assert part in needs
+    (distribution / MADE_FOR).chmod(0o644)
     (distribution / MADE_FOR).write_text(needs.replace(part, f"{part}x"))
     assert not copy_shipped(tmp_path / "cache", needs, SOURCES)
     assert not (tmp_path / "cache").exists()
@@ -95,7 +98,7 @@ def test_a_cache_that_cannot_take_the_kernels_is_no_reason_to_stop(
     def full(*_: object, **__: object) -> None:
         raise OSError("No space left on device")
 
-    monkeypatch.setattr(shutil, "copytree", full)
+    monkeypatch.setattr(shutil, "copyfile", full)
     monkeypatch.setattr("os.environ", {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "home")})
     os.environ.pop(VARIABLE, None)
     kernel_cache.use_kernel_cache()
