@@ -53,6 +53,8 @@ def _cure(largest: Cause, settings: TagSettings) -> Sentence:
         return say("cure.north", "Set how far north may be off where it is (`heading_std_rad`).")
     if largest is Cause.MOUNT and settings.mount_angle_rad is None and settings.motion != "carried":
         return say("cure.mount", "Set the mounting angle (`mount_angle_rad`), or let it turn left and right.")
+    if largest is Cause.MOUNT and settings.slip_std_rad is None and settings.motion != "carried":
+        return say("cure.rigid", "If it is fixed firmly, say so (`mount_angle_std_rad`, `slip_std_rad`).")
     if largest is Cause.SPEED:
         return say("cure.speed", "Let it turn, or stop for a moment.")
     if largest is Cause.HEIGHT:

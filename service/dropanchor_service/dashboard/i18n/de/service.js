@@ -104,6 +104,7 @@ export default {
   "say.cure.anchor": "Ein zweiter Anker würde es zeigen.",
   "say.cure.north": "Legen Sie fest, wie weit Nord an seinem Ort falsch sein kann (`heading_std_rad`).",
   "say.cure.mount": "Legen Sie den Einbauwinkel fest (`mount_angle_rad`), oder lassen Sie es links und rechts abbiegen.",
+  "say.cure.rigid": "Wenn es fest eingebaut ist, sagen Sie es (`mount_angle_std_rad`, `slip_std_rad`).",
   "say.cure.speed": "Lassen Sie es abbiegen oder kurz halten.",
   "say.cure.height": "Legen Sie seine Höhe fest (`height_m`), oder senden Sie Luftdruckwerte.",
   "say.cure.ranges": "Machen Sie die Sichtlinie frei, oder kalibrieren Sie die Distanzen (`range_bias_std_m`).",

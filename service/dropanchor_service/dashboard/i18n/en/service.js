@@ -104,6 +104,7 @@ export default {
   "say.cure.anchor": "A second anchor would tell.",
   "say.cure.north": "Set how far north may be off where it is (`heading_std_rad`).",
   "say.cure.mount": "Set the mounting angle (`mount_angle_rad`), or let it turn left and right.",
+  "say.cure.rigid": "If it is fixed firmly, say so (`mount_angle_std_rad`, `slip_std_rad`).",
   "say.cure.speed": "Let it turn, or stop for a moment.",
   "say.cure.height": "Set its height (`height_m`), or send pressures.",
   "say.cure.ranges": "Free the line of sight, or calibrate the ranges (`range_bias_std_m`).",
