@@ -3,12 +3,13 @@
 import gc
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 from support.kernel_cache import use_cache_of_these_sources
-from support.outside import is_long, is_outside
+from support.outside import is_left_out, is_long, is_outside
 from support.patience import be_patient_with_http
 from support.zenoh_router import free_endpoint, running_router
 
@@ -21,6 +22,10 @@ settings.load_profile("dropanchor")
 
 # One worker runs these tests, which need no kernels, while another one fills the kernel cache.
 FIRST = ("benchmarks", "schemas", "tag_client")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    return True if is_left_out(collection_path, config) else None  # None lets others say
 
 
 @pytest.hookimpl(tryfirst=True)  # before tests are deselected by their marks
