@@ -22,7 +22,7 @@ def make_routes_late() -> None:
     Until then it knows its path and its methods alone. What it then is, and what it answers, is what FastAPI makes of
     it: a wrong declaration fails in the tests of its path and in those of the document.
     """
-    APIRoute.__init__ = _know_path  # type: ignore[assignment, method-assign]
+    APIRoute.__init__ = _know_path  # type: ignore[method-assign]
     APIRoute.__getattr__ = _become_complete  # type: ignore[attr-defined]
     sites._describe = _describe_later
 
