@@ -1,7 +1,9 @@
 """Set-up and fixtures for the whole suite."""
 
 import gc
+import os
 import signal
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +17,9 @@ from support.zenoh_router import free_endpoint, running_router
 
 use_cache_of_these_sources()
 be_patient_with_http()
+# Without compiled modules each of the hundreds of programs that the tests start would compile all of them again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 # A shell without job control makes what it starts in the background ignore Ctrl-C, and so would the programs of tests.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 settings.register_profile("dropanchor", deadline=None)  # test machines are slow at times
