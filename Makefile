@@ -10,14 +10,14 @@ PACKAGES := schemas/dropanchor_schemas tag_client/dropanchor_tag_client service/
 PARALLEL := -n 6 --dist loadfile --no-loadscope-reorder
 PYPROJECTS := pyproject.toml constraints.txt schemas/pyproject.toml tag_client/pyproject.toml service/pyproject.toml service/evaluation/pyproject.toml
 
-FAST_TESTS := -n 2 --dist worksteal -m 'not benchmark and not cluster and not installation and not outside and not long'
+FAST_TESTS := -n 3 --dist worksteal -m 'not benchmark and not cluster and not installation and not outside and not long'
 
 RESULTS := service/docs/results
 
 .PHONY: help demo docs test test-cluster check bench results pictures install kernels chromium mosquitto proxies postgresql clean
 .DEFAULT_GOAL := help
 
-# Without compiled modules each of the hundreds of programs that the tests start would compile all of them again.
+# The same as in tests/conftest.py, from the first import on.
 unexport PYTHONDONTWRITEBYTECODE
 
 help:

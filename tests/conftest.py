@@ -1,19 +1,25 @@
 """Set-up and fixtures for the whole suite."""
 
 import gc
+import os
 import signal
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 from support.kernel_cache import use_cache_of_these_sources
-from support.outside import is_long, is_outside
+from support.outside import is_left_out, is_long, is_outside
 from support.patience import be_patient_with_http
 from support.zenoh_router import free_endpoint, running_router
 
 use_cache_of_these_sources()
 be_patient_with_http()
+# Without compiled modules each of the hundreds of programs that the tests start would compile all of them again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 # A shell without job control makes what it starts in the background ignore Ctrl-C, and so would the programs of tests.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 settings.register_profile("dropanchor", deadline=None)  # test machines are slow at times
@@ -21,6 +27,10 @@ settings.load_profile("dropanchor")
 
 # One worker runs these tests, which need no kernels, while another one fills the kernel cache.
 FIRST = ("benchmarks", "schemas", "tag_client")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    return True if is_left_out(collection_path, config) else None  # None lets others say
 
 
 @pytest.hookimpl(tryfirst=True)  # before tests are deselected by their marks

@@ -1,5 +1,6 @@
 """A real Chromium, and pages that record their requests and their errors."""
 
+import asyncio
 import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -53,6 +54,35 @@ def running_chromium() -> Iterator[Browser]:
         browser = playwright.chromium.launch(executable_path=executable, args=_ARGUMENTS)
         yield browser
         browser.close()
+
+
+class PausedBrowser:
+    """A browser that the files of a worker drive one after the other: to start one takes longer than many tests.
+
+    Between them this thread has no running event loop, so that other tests can run their own.
+    """
+
+    def __init__(self, browser: Browser) -> None:
+        self._browser, self._loop = browser, asyncio.get_running_loop()
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        asyncio._set_running_loop(None)
+        try:
+            yield
+        finally:
+            asyncio._set_running_loop(self._loop)
+
+    @contextmanager
+    def driven(self) -> Iterator[Browser]:
+        """Drive the paused browser until the block ends. Its pages are closed then."""
+        asyncio._set_running_loop(self._loop)
+        try:
+            yield self._browser
+        finally:
+            for context in self._browser.contexts:  # those of tests that failed
+                context.close()
+            asyncio._set_running_loop(None)
 
 
 @dataclass

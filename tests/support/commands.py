@@ -1,12 +1,38 @@
 """Run Python programs of this repository in processes of their own."""
 
+import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 _ROOT = Path(__file__).parents[2]
 _PACKAGES = os.pathsep.join(str(_ROOT / name) for name in ("schemas", "tag_client", "service", "service/evaluation"))
+
+_CALLS = """
+import contextlib, importlib, io, json, sys
+main = importlib.import_module(f"{sys.argv[1]}.cli").main
+ended = []
+for words in json.load(sys.stdin):
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            code = main(words)
+        except SystemExit as end:
+            code = end.code or 0
+    ended.append((code, out.getvalue(), err.getvalue()))
+json.dump(ended, sys.stdout)
+"""
+
+
+class Ended(NamedTuple):
+    """What a call of a command left behind."""
+
+    returncode: int
+    stdout: str
+    stderr: str
 
 
 def environment() -> dict[str, str]:
@@ -39,3 +65,13 @@ def start_python(*arguments: str) -> subprocess.Popen[str]:
         text=True,
         env=environment(),
     )
+
+
+def called(package: str, calls: Sequence[Sequence[str]]) -> list[Ended]:
+    """Return what the program of a package answers to each of these words, one after the other in one new process.
+
+    A process for each of them would import the same modules again.
+    """
+    ended = python("-c", _CALLS, package, text_input=json.dumps([list(words) for words in calls]))
+    assert ended.returncode == 0, ended.stderr
+    return [Ended(*one) for one in json.loads(ended.stdout)]

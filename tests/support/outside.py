@@ -53,6 +53,16 @@ LONG = (
 """Files and folders whose tests simulate minutes of data or make hundreds of requests at random."""
 
 
+def is_left_out(path: Path, config: pytest.Config) -> bool:
+    """Return whether the marks that are asked for leave out all tests of a file or folder, so that none is imported."""
+    tests, wanted = config.rootpath / "tests", str(config.option.markexpr)
+    conditions = [] if " or " in wanted else wanted.split(" and ")
+    return path.is_relative_to(tests) and (
+        ("not outside" in conditions and _is_in(_below(path, tests), tuple(FOLDERS)))
+        or ("not long" in conditions and _is_in(_below(path, tests), LONG))
+    )
+
+
 def is_long(item: pytest.Item) -> bool:
     """Return whether a test is one of LONG."""
     return _is_in(_path(item), LONG)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ Samples = tuple[Array, Array]  # IMU, RANGE
 Fault = Callable[[Array, Array], None]  # changes IMU and RANGE in place
 
 
+@lru_cache(maxsize=8)  # tests with one fault after the other have the same run
 def run_of(scenario: str, seed: int, noise: str = "calibrated") -> Simulation:
     """Return a run with IMU samples at 100 Hz and ranges at 10 Hz."""
     if scenario in CARRIED:

@@ -20,6 +20,9 @@ from dropanchor_service.security.identity import Authenticator
 from dropanchor_service.settings.quota import Quota
 from dropanchor_service.store import LatestPoses, Sites, SiteStore
 from dropanchor_service.store.omlox_items import OmloxItems
+from support.lazy_routes import make_routes_late
+
+make_routes_late()
 
 T_NS = 1_800_000_000_000_000_000
 

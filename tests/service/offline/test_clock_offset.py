@@ -1,5 +1,6 @@
 """The offset of the IMU's clock shows from a whole recording, or not at all."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from support.recordings import recording_or_skip
 SENSORS = preset("real", imu_hz=50.0)
 
 
+@cache  # each offset is looked for in the same drives
 def yard(seed: int, duration_s: float = 120.0) -> Simulation:
     return simulation("yard", seed, seed % 4, SENSORS, duration_s)
 

@@ -4,6 +4,7 @@ import json
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Event, Thread
 from typing import Any
@@ -25,6 +26,11 @@ from support.api import ask, make_api_bench
 AUDIENCE = "dropanchor-yard"
 
 
+@cache  # a key takes longer to make than a test to run; each name has its own
+def _key_named(_kid: str) -> rsa.RSAPrivateKey:
+    return rsa.generate_private_key(65537, 2048)
+
+
 @dataclass
 class Provider:
     """Signs tokens and publishes its keys. requested: the requested paths; moved_to: redirects every request there."""
@@ -35,7 +41,7 @@ class Provider:
     moved_to: str = ""
 
     def new_key(self, kid: str) -> None:
-        self.keys[kid] = rsa.generate_private_key(65537, 2048)
+        self.keys[kid] = _key_named(kid)
 
     def answer(self, path: str) -> dict[str, Any]:
         self.requested.append(path)
@@ -83,7 +89,7 @@ def provider() -> Iterator[Provider]:
             pass
 
     with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
-        thread = Thread(target=server.serve_forever)
+        thread = Thread(target=server.serve_forever, args=(0.02,))
         thread.start()
         found.url = f"http://127.0.0.1:{server.server_port}"
         found.new_key("one")
@@ -185,7 +191,7 @@ def test_a_role_among_values_that_are_no_text_still_counts(provider: Provider) -
 
 def test_a_token_that_names_no_key_is_tried_with_the_only_one(provider: Provider) -> None:
     assert OidcTokens(provider.settings()).identify(provider.token(kid=None)).name == "ann"
-    forged = provider.token(kid=None, key=rsa.generate_private_key(65537, 2048))
+    forged = provider.token(kid=None, key=_key_named("forged"))
     with pytest.raises(UnauthenticatedError, match="Signature"):
         OidcTokens(provider.settings()).identify(forged)
     provider.new_key("two")
@@ -195,7 +201,7 @@ def test_a_token_that_names_no_key_is_tried_with_the_only_one(provider: Provider
 
 def test_forged_signatures_are_refused(provider: Provider) -> None:
     tokens = OidcTokens(provider.settings())
-    foreign = rsa.generate_private_key(65537, 2048)
+    foreign = _key_named("foreign")
     public = provider.keys["one"].public_key()
     for forged in (
         provider.token(key=foreign),
