@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dropanchor_schemas.kinds import PRESSURE, SCALARS, Kind
-from dropanchor_schemas.wire import MAX_T_NS, Reason
+from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array, SampleBatch
 from dropanchor_service.ingest.backlog import Message
 from dropanchor_service.ingest.batch import Batch, Spans, engine_columns, spans_of, times_of
 from dropanchor_service.ingest.decode import Forms, read_forms, read_samples
 from dropanchor_service.ingest.due import due_of_each
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
+from dropanchor_service.ingest.kernels.arrivals import record_arrivals
 from dropanchor_service.ingest.messages import Messages
 from dropanchor_service.ingest.publishers import Publishers, Sequenced
 from dropanchor_service.ingest.rejections import Rejections
@@ -20,7 +21,6 @@ from dropanchor_service.ingest.reorder_buffer import ReorderBuffer
 from dropanchor_service.ingest.screening import absurd_imu, keep, screen
 from dropanchor_service.ingest.times import in_time
 from dropanchor_service.store import Sites
-from dropanchor_service.store.arrivals import Arrived
 from dropanchor_service.store.rings import rank_in_row
 from dropanchor_service.store.rows import MESSAGE
 
@@ -201,15 +201,11 @@ class SampleReader:
 
     def _note_arrivals(self, batch: Batch, spans: Spans) -> None:
         """Record when the samples of live tags arrived. Its ranges are those to anchors of the site."""
-        messages, ranges, due = batch.messages, batch.samples.ranges, batch.sequenced.due
-        oldest, newest, newest_of = spans
-        filled = due[newest[due] >= 0]
-        self.span_ns = int((newest[filled] - oldest[filled]).min(initial=MAX_T_NS))
-        live = filled[~messages.read.forms["replay"][filled].astype(bool)]
-        counts = np.bincount(ranges["message"], minlength=len(messages.rows))
-        zeros = np.bincount(ranges["message"][ranges["value"] == 0.0], minlength=len(messages.rows))
-        times = (messages.arrived[live], oldest[live], newest[live], newest_of[:, live])
-        self._rows.arrivals.record(Arrived(messages.rows[live], *times, counts[live], zeros[live]))
+        known, messages = self._rows.arrivals, batch.messages
+        self.span_ns = record_arrivals(
+            *(known.columns, known.are_conspicuous, messages.read.forms, messages.rows, messages.arrived),
+            *(batch.sequenced.due, spans.oldest, spans.newest_of, batch.samples.ranges),
+        )
 
     def _note_unknown_anchors(self, batch: Batch) -> None:
         """Record ranges to anchors that their sites do not have. A site without anchors gets the first one."""
