@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dropanchor_schemas.kinds import PRESSURE, SCALARS, Kind
+from dropanchor_schemas.kinds import PRESSURE, SCALARS, Kind, RangeSample
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array, SampleBatch
 from dropanchor_service.ingest.backlog import Message
@@ -166,7 +166,6 @@ class SampleReader:
         """Return what the engine gets, and record what the batch tells about its tags."""
         spans = spans_of(batch)
         self._note_replays(batch, spans)
-        self._note_unknown_anchors(batch)
         anchored = self._anchored(batch)
         self._note_arrivals(anchored, spans)
         for entry in anchored.rejected:
@@ -207,14 +206,11 @@ class SampleReader:
             *(batch.sequenced.due, spans.oldest, spans.newest_of, batch.samples.ranges),
         )
 
-    def _note_unknown_anchors(self, batch: Batch) -> None:
-        """Record ranges to anchors that their sites do not have. A site without anchors gets the first one."""
+    def _note_unknown_anchors(self, batch: Batch, unknown: Array) -> None:
+        """Record these ranges to anchors that their sites do not have. A site without anchors gets the first one."""
         names = batch.samples.anchor_names
-        unknown = self._of_unknown_anchors(batch, batch.samples.ranges)
-        if not len(unknown):
-            return
         if self._bind_first_anchors(batch, unknown):
-            unknown = self._of_unknown_anchors(batch, unknown)
+            unknown = unknown[self._indices(batch, unknown) < 0]
         messages, first = np.unique(unknown["message"], return_index=True)
         for message, number in zip(messages.tolist(), unknown["anchor"][first].tolist(), strict=True):
             name, tag = names.get(number, str(number)), self._rows.at(int(batch.messages.rows[message]))
@@ -234,11 +230,6 @@ class SampleReader:
             self._engine.follow_sites()
         return any(bound)
 
-    def _of_unknown_anchors(self, batch: Batch, samples: Array) -> Array:
-        unknown = self._indices(batch, samples) < 0
-        found: Array = samples[unknown] if unknown.any() else samples[:0]
-        return found
-
     def _indices(self, batch: Batch, samples: Array) -> Array:
         """Return the engine's index of the anchor of each sample, -1 if the site of its tag lacks it."""
         return self._engine.anchor_indices(batch.rows_of(samples), samples["anchor"])
@@ -256,6 +247,9 @@ class SampleReader:
         if not len(samples):
             return samples
         indices = self._indices(batch, samples)
+        if kind.sample is RangeSample and (indices < 0).any():
+            self._note_unknown_anchors(batch, samples[indices < 0])
+            indices = self._indices(batch, samples)
         unknown = indices < 0
         kept = keep(samples, unknown, Reason.ANCHOR_UNKNOWN, kind.name, batch.rejected)
         kept["anchor"] = indices[~unknown]
