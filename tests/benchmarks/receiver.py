@@ -26,7 +26,7 @@ def main(endpoint: str, own: bool) -> None:
     count = [0]
 
     def take_all(channel: Any) -> None:
-        for sample in drain(channel, lambda: time.sleep(GATHER_S)):
+        for sample in drain(channel, lambda _: time.sleep(GATHER_S)):
             count[0] += len((str(sample.key_expr), bytes(sample.payload))) // 2
 
     with open_session(ZenohSettings(listen=(endpoint,))) if own else connected_session(endpoint) as session:

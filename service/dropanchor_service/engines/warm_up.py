@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.plans import Floor
 from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Site
@@ -29,6 +30,7 @@ from dropanchor_service.estimation.columns import (
     HEADING,
     HYPOTHESIS,
     IMU,
+    INNOVATION,
     POSE,
     RANGE,
     Engine,
@@ -38,12 +40,15 @@ from dropanchor_service.estimation.columns import (
 )
 from dropanchor_service.estimation.plausibility.check import SensorCheck
 from dropanchor_service.ingest.decode import read_forms, read_samples
+from dropanchor_service.ingest.kernels.arrivals import record_arrivals
+from dropanchor_service.ingest.kernels.starts import OPEN, follow_starts
 from dropanchor_service.ingest.kernels.values import shift_times, time_spans
 from dropanchor_service.ingest.messages import Messages
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.screening import screen
 from dropanchor_service.runtime.kernel_cache import VARIABLE, is_kept
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store.arrivals import Arrivals
 from dropanchor_service.store.floors import floors_of
 from dropanchor_service.store.groups import Groups
 from dropanchor_service.zones.modes import placed
@@ -252,6 +257,12 @@ def _ingest(payloads: list[bytes]) -> None:
     for messages, t_ns in samples:
         shift_times(t_ns, messages, offsets.messages)
         time_spans(t_ns, messages, np.zeros(n, np.int64), np.zeros(n, np.int64))
+    arrivals, newest_of = Arrivals(), np.full((len(KINDS), n), -1, np.int64)
+    record_arrivals(
+        *(arrivals.columns, arrivals.are_conspicuous, read.forms, of_turn.rows, of_turn.arrived, sequenced.due),
+        *(np.zeros(n, np.int64), newest_of, decoded.ranges),
+    )
+    follow_starts(np.zeros(n, POSE), np.zeros(n, INNOVATION), np.zeros(n, OPEN), np.zeros(n, np.int64))
 
 
 def warm_up_answers(progress: CompilationProgress | None = None) -> None:

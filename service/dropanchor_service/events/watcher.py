@@ -47,14 +47,18 @@ class Watcher:
         self._pose_version = 0
         self._slow_due_ns = self._pairs_due_ns = 0
         self._deleted: frozenset[int] = frozenset()
+        self._follows_poses = True  # whether there is a zone or a rule for which poses matter
         self._unconfirmed: set[int] = set()  # rows whose start the ranges have not confirmed yet
         self._outdated: dict[int, int] = {}  # time of the latest pose of rows of which it comes from a start of before
         self.is_full = False
         """Whether there are more pairs of tags too close to each other than a rule can follow."""
 
     def on_news(self, told: Callable[[], None]) -> None:
-        """Call this after each change that a turn would judge, on the thread that makes it."""
-        self._latest.on_change(told)
+        """Call this after each change that a turn would judge, on the thread that makes it.
+
+        Poses are none while there is no zone and no rule.
+        """
+        self._latest.on_change(lambda: told() if self._follows_poses else None)
         self._rows.start_news.on_change(told)
         for site in self._watched:
             for one in (site.items.zones, site.items.rules, site.store):
@@ -94,6 +98,7 @@ class Watcher:
                     sites[index] = site
                 else:
                     sites.pop(index, None)
+        self._follows_poses = self._zones.has_zones or bool(self._with_pairs or self._with_tag_rules)
 
     def _register_tags(self) -> None:
         known = len(self._zones)

@@ -95,5 +95,4 @@ class Backlog:
 
 def most_of_a_row(messages: Iterable[Message]) -> int:
     """Return how many of these messages are of the same tag, at most."""
-    rows = np.fromiter(map(ROW, messages), np.int64)
-    return int(np.bincount(rows).max(initial=0))
+    return max(Counter(map(ROW, messages)).values(), default=0)

@@ -51,7 +51,8 @@ def spans_of(batch: Batch) -> Spans:
     messages = len(batch.messages.rows)
     oldest, newest_of = np.full(messages, MAX_T_NS, np.int64), np.full((len(KINDS), messages), -1, np.int64)
     for (indices, t_ns), newest in zip(times_of(batch.samples), newest_of, strict=True):
-        time_spans(t_ns, indices, oldest, newest)
+        if len(t_ns):
+            time_spans(t_ns, indices, oldest, newest)
     return Spans(oldest, newest_of.max(axis=0), newest_of)
 
 

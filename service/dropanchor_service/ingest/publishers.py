@@ -149,7 +149,8 @@ class Publishers:
         newest, counts = np.full((n, 3), -1, np.int64), np.zeros((n, 3), np.int64)
         offsets, motion, restarts = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, bool)
         for kind, (indices, t_ns) in enumerate(samples):
-            newest_times(t_ns, indices, kind, newest, counts)
+            if len(t_ns):
+                newest_times(t_ns, indices, kind, newest, counts)
         jumps = time_offsets(
             *(forms, sequenced.slots, newest, counts, messages.arrived, sequenced.due, self._columns, self._times),
             *(offsets, motion, restarts),

@@ -5,14 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dropanchor_schemas.kinds import PRESSURE, SCALARS, Kind
-from dropanchor_schemas.wire import MAX_T_NS, Reason
+from dropanchor_schemas.kinds import PRESSURE, SCALARS, Kind, RangeSample
+from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array, SampleBatch
 from dropanchor_service.ingest.backlog import Message
 from dropanchor_service.ingest.batch import Batch, Spans, engine_columns, spans_of, times_of
 from dropanchor_service.ingest.decode import Forms, read_forms, read_samples
 from dropanchor_service.ingest.due import due_of_each
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
+from dropanchor_service.ingest.kernels.arrivals import record_arrivals
 from dropanchor_service.ingest.messages import Messages
 from dropanchor_service.ingest.publishers import Publishers, Sequenced
 from dropanchor_service.ingest.rejections import Rejections
@@ -20,7 +21,6 @@ from dropanchor_service.ingest.reorder_buffer import ReorderBuffer
 from dropanchor_service.ingest.screening import absurd_imu, keep, screen
 from dropanchor_service.ingest.times import in_time
 from dropanchor_service.store import Sites
-from dropanchor_service.store.arrivals import Arrived
 from dropanchor_service.store.rings import rank_in_row
 from dropanchor_service.store.rows import MESSAGE
 
@@ -166,7 +166,6 @@ class SampleReader:
         """Return what the engine gets, and record what the batch tells about its tags."""
         spans = spans_of(batch)
         self._note_replays(batch, spans)
-        self._note_unknown_anchors(batch)
         anchored = self._anchored(batch)
         self._note_arrivals(anchored, spans)
         for entry in anchored.rejected:
@@ -201,24 +200,17 @@ class SampleReader:
 
     def _note_arrivals(self, batch: Batch, spans: Spans) -> None:
         """Record when the samples of live tags arrived. Its ranges are those to anchors of the site."""
-        messages, ranges, due = batch.messages, batch.samples.ranges, batch.sequenced.due
-        oldest, newest, newest_of = spans
-        filled = due[newest[due] >= 0]
-        self.span_ns = int((newest[filled] - oldest[filled]).min(initial=MAX_T_NS))
-        live = filled[~messages.read.forms["replay"][filled].astype(bool)]
-        counts = np.bincount(ranges["message"], minlength=len(messages.rows))
-        zeros = np.bincount(ranges["message"][ranges["value"] == 0.0], minlength=len(messages.rows))
-        times = (messages.arrived[live], oldest[live], newest[live], newest_of[:, live])
-        self._rows.arrivals.record(Arrived(messages.rows[live], *times, counts[live], zeros[live]))
+        known, messages = self._rows.arrivals, batch.messages
+        self.span_ns = record_arrivals(
+            *(known.columns, known.are_conspicuous, messages.read.forms, messages.rows, messages.arrived),
+            *(batch.sequenced.due, spans.oldest, spans.newest_of, batch.samples.ranges),
+        )
 
-    def _note_unknown_anchors(self, batch: Batch) -> None:
-        """Record ranges to anchors that their sites do not have. A site without anchors gets the first one."""
+    def _note_unknown_anchors(self, batch: Batch, unknown: Array) -> None:
+        """Record these ranges to anchors that their sites do not have. A site without anchors gets the first one."""
         names = batch.samples.anchor_names
-        unknown = self._of_unknown_anchors(batch, batch.samples.ranges)
-        if not len(unknown):
-            return
         if self._bind_first_anchors(batch, unknown):
-            unknown = self._of_unknown_anchors(batch, unknown)
+            unknown = unknown[self._indices(batch, unknown) < 0]
         messages, first = np.unique(unknown["message"], return_index=True)
         for message, number in zip(messages.tolist(), unknown["anchor"][first].tolist(), strict=True):
             name, tag = names.get(number, str(number)), self._rows.at(int(batch.messages.rows[message]))
@@ -238,11 +230,6 @@ class SampleReader:
             self._engine.follow_sites()
         return any(bound)
 
-    def _of_unknown_anchors(self, batch: Batch, samples: Array) -> Array:
-        unknown = self._indices(batch, samples) < 0
-        found: Array = samples[unknown] if unknown.any() else samples[:0]
-        return found
-
     def _indices(self, batch: Batch, samples: Array) -> Array:
         """Return the engine's index of the anchor of each sample, -1 if the site of its tag lacks it."""
         return self._engine.anchor_indices(batch.rows_of(samples), samples["anchor"])
@@ -260,6 +247,9 @@ class SampleReader:
         if not len(samples):
             return samples
         indices = self._indices(batch, samples)
+        if kind.sample is RangeSample and (indices < 0).any():
+            self._note_unknown_anchors(batch, samples[indices < 0])
+            indices = self._indices(batch, samples)
         unknown = indices < 0
         kept = keep(samples, unknown, Reason.ANCHOR_UNKNOWN, kind.name, batch.rejected)
         kept["anchor"] = indices[~unknown]

@@ -32,13 +32,12 @@ class Early(NamedTuple):
 
 def in_time(batch: Batch, offsets: TimeOffsets) -> tuple[Batch, list[Early]]:
     """Add the offset of its message to the time of each sample, and reject samples whose time then cannot be UTC."""
-    imu, *scalars = times_of(batch.samples)
-    outside = shift_times(imu[1], imu[0], offsets.motion)
-    outside += sum(shift_times(t_ns, messages, offsets.messages) for messages, t_ns in scalars)
-    if not outside:
+    times = times_of(batch.samples)
+    of_kinds = [offsets.motion, *[offsets.messages] * (len(times) - 1)]
+    both = zip(times, of_kinds, strict=True)
+    if not sum(shift_times(t_ns, messages, added_ns) for (messages, t_ns), added_ns in both if len(t_ns)):
         return batch, []
     columns, every = [], []
-    of_kinds = [offsets.motion, *[offsets.messages] * len(scalars)]
     for kind, column, of_messages in zip(KINDS, batch.samples.columns(), of_kinds, strict=True):
         kept = keep(column, ~within_time(column["t_ns"]), Reason.TIME_OUT_OF_RANGE, kind.name, batch.rejected)
         is_early = kept["t_ns"] < EARLIEST_UTC_NS

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from functools import partial
+from threading import Lock
 from typing import Self
 
 from dropanchor_service.estimation.columns import Array
@@ -9,6 +11,7 @@ from dropanchor_service.ingest.observers import Observers
 from dropanchor_service.metrics.persistence import HistoryMetrics, RecordingMetrics
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.persistence.site import Persistence, open_basemap, open_database, retention_of, settings_of
+from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.store import Sites
@@ -42,6 +45,11 @@ class SiteFolders:
         self.basemap = open_basemap(settings, [site.store for site in sites])
         if tracks := [one.tracks for one in self.all if one.tracks is not None]:
             metrics.register(HistoryMetrics(*tracks))
+        self._recording: set[int] = set()  # indices of the sites that record now
+        self._following = Lock()
+        for index, one in enumerate(self.all):
+            if one.recorder is not None:
+                one.recorder.on_change(partial(self._follow, index, one.recorder))
         if recorders := [one.recorder for one in self.all if one.recorder is not None]:
             metrics.register(RecordingMetrics(*recorders))
 
@@ -75,7 +83,7 @@ class SiteFolders:
             return to_sites[0]
 
         def on_messages(messages: Sequence[tuple[int, bytes, str, int]]) -> None:
-            if not self._records():
+            if not self._recording:
                 return
             of_sites: dict[int, list[tuple[int, bytes, str, int]]] = {}
             for message in messages:
@@ -85,7 +93,7 @@ class SiteFolders:
 
         def on_poses(poses: Array) -> None:
             self._keep(poses)
-            if self._records():
+            if self._recording:
                 for site, of_site in self._sites.rows.by_site(poses):
                     if (recorder := self.all[site].recorder) is not None:
                         recorder.record_poses(of_site)
@@ -101,8 +109,13 @@ class SiteFolders:
             if (tracks := self.all[site].tracks) is not None:
                 tracks.keep(of_site)
 
-    def _records(self) -> bool:
-        return any(one.recorder is not None and one.recorder.running is not None for one in self.all)
+    def _follow(self, index: int, recorder: Recorder) -> None:
+        """Note whether a site records. A turn of the ingest visits no site to find out."""
+        with self._following:
+            if recorder.running is None:
+                self._recording.discard(index)
+            else:
+                self._recording.add(index)
 
 
 def _named(sites: Sequence[str]) -> str:

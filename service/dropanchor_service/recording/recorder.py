@@ -62,6 +62,7 @@ class Recorder:
         self._now_ns = now_ns
         self._metadata = metadata
         self._running: RunningRecording | None = None
+        self._told: list[Callable[[], None]] = []
         self._ending = threading.Lock()  # nothing is queued behind the end, where it would open another file
         self._site_version = 0
         self._session = ""
@@ -82,6 +83,14 @@ class Recorder:
             self.writer.stop()
         if self._owned is not None:
             self._owned.close()
+
+    def on_change(self, told: Callable[[], None]) -> None:
+        """Call this after a recording has begun or ended, on the thread that made it."""
+        self._told.append(told)
+
+    def _tell(self) -> None:
+        for told in self._told:
+            told()
 
     @property
     def running(self) -> RunningRecording | None:
@@ -129,6 +138,7 @@ class Recorder:
         since_ns = self._now_ns()
         self._session = str(since_ns)
         self._running = RunningRecording(since_ns, None if tags is None else tuple(tags))
+        self._tell()
         return True
 
     def stop(self, wait_s: float = 0.0) -> bool:
@@ -142,6 +152,7 @@ class Recorder:
                 return False
             self._running = None
             self.writer.put(end, 0)
+        self._tell()
         if wait_s > 0:
             self.writer.hurry()
             end.is_done.wait(wait_s)

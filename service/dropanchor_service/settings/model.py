@@ -91,7 +91,7 @@ class IngestSettings(_Section):
     period_ms: Annotated[float, Field(gt=0, le=1000)] = Field(
         default=20.0,
         description="Period of the ingest: samples that arrive within it are fused together. While few messages come, "
-        "it grows up to five times, but to 100 ms and half of the time for which tags gather samples at most.",
+        "it grows up to 7.5 times, but to 150 ms and three quarters of the time for which tags gather samples at most.",
     )
     reorder_ms: Annotated[float, Field(ge=0, le=10_000)] = Field(
         default=250.0, description="How long a message waits for missing ones that its publisher numbered before it."

@@ -101,8 +101,8 @@ class ZenohIntake:
         for message in drain(samples, self._gather):
             self._receive(message)
 
-    def _gather(self) -> None:
-        self._first_ns = self._clock.now_ns()
+    def _gather(self, has_first: bool) -> None:
+        self._first_ns = self._clock.now_ns() if has_first else None
         time.sleep(self._period.gathering_s)
 
     def _receive(self, message: zenoh.Sample) -> None:
@@ -114,7 +114,7 @@ class ZenohIntake:
 
     def _receive_health(self, reports: Any) -> None:
         """Pass on health until the subscriber is undeclared."""
-        for report in drain(reports, lambda: time.sleep(HEALTH_GATHER_S)):
+        for report in drain(reports, lambda _: time.sleep(HEALTH_GATHER_S)):
             encoding, key = payload_encoding(str(report.encoding)).partition(";")[0], str(report.key_expr)
             if self._sites.serves(key):
                 self._ingest.health.put(key, bytes(report.payload), encoding, self._clock.now_ns())

@@ -18,12 +18,12 @@ def period_after(messages: int, elapsed_s: float, span_s: float, shortest_s: flo
     return period.current_s
 
 
-def test_few_messages_wait_for_half_of_the_time_for_which_their_tags_gathered_samples() -> None:
-    assert period_after(5, 0.02, span_s=0.19) == pytest.approx(0.095)
+def test_few_messages_wait_for_three_quarters_of_the_time_for_which_their_tags_gathered_samples() -> None:
+    assert period_after(5, 0.02, span_s=0.19) == pytest.approx(0.1425)
 
 
-def test_no_message_waits_longer_than_a_tenth_of_a_second() -> None:
-    assert period_after(5, 0.02, span_s=10.0) == 0.1
+def test_no_message_waits_longer_than_150_ms() -> None:
+    assert period_after(5, 0.02, span_s=10.0) == 0.15
 
 
 def test_messages_of_single_samples_do_not_wait() -> None:
@@ -42,10 +42,10 @@ def test_a_turn_without_messages_changes_nothing() -> None:
     period = Period(SHORTEST_S)
     period.adapt(5, 0.02, 0.19)
     period.adapt(0, 1.0, 0.0)
-    assert period.current_s == pytest.approx(0.095)
+    assert period.current_s == pytest.approx(0.1425)
 
 
-@pytest.mark.parametrize(("shortest_s", "longest_s"), [(0.002, 0.01), (0.5, 0.5)])
+@pytest.mark.parametrize(("shortest_s", "longest_s"), [(0.002, 0.015), (0.5, 0.5)])
 def test_the_setting_bounds_the_period(shortest_s: float, longest_s: float) -> None:
     assert period_after(1, 1.0, 10.0, shortest_s) == pytest.approx(longest_s)
 
@@ -56,14 +56,14 @@ def test_the_thread_gathers_longer_when_few_messages_hold_samples_of_a_long_time
     thread = IngestThread(bench.ingest, bench.buffer, bench.metrics, period)
     thread.start()
     bench.put("a", Frame(ranges=[RangeSample(T + 100 * MS, 7, 4.0), RangeSample(T + 200 * MS, 7, 4.0)]))
-    wait_until(lambda: period.current_s == pytest.approx(0.05))
+    wait_until(lambda: period.current_s == pytest.approx(0.075))
     bench.put("a", Frame(ranges=[RangeSample(T + 300 * MS, 7, 4.0)]))
     wait_until(lambda: period.current_s == SHORTEST_S)
     thread.stop()
 
 
-@pytest.mark.parametrize(("shortest_s", "gathering_s"), [(0.02, 0.004), (1.0, 0.02)])
-def test_arrival_times_are_wrong_by_a_fiftieth_of_a_second_at_most(shortest_s: float, gathering_s: float) -> None:
+@pytest.mark.parametrize(("shortest_s", "gathering_s"), [(0.02, 0.004), (1.0, 0.03)])
+def test_arrival_times_are_wrong_by_30_ms_at_most(shortest_s: float, gathering_s: float) -> None:
     assert Period(shortest_s).gathering_s == pytest.approx(gathering_s)
 
 

@@ -3,11 +3,13 @@
 import math
 
 import numpy as np
+import pytest
 
 from dropanchor_evaluation.simulated import PriorKnowledge, batches, configure, merged, samples_of
 from dropanchor_schemas.site import StartPose, TagSettings
-from dropanchor_service.estimation.columns import ANCHOR
+from dropanchor_service.estimation.columns import ANCHOR, INNOVATION, POSE, MeasurementKind
 from dropanchor_service.estimation.fleet.engine import FleetEngine
+from dropanchor_service.ingest.kernels.starts import OPEN, follow_starts
 from dropanchor_service.ingest.starts import StartWatch
 from dropanchor_service.settings.engine_columns import tag_columns
 from dropanchor_service.store.starts import StartNewsQueue, StartPhase
@@ -106,3 +108,18 @@ def test_a_row_that_an_earlier_process_had_tells_that_its_settings_have_no_start
     news = StartNewsQueue()
     StartWatch(FleetEngine(), news).tell(0, TagSettings(), None)
     assert [(one.phase, one.place) for one in news.take()] == [(StartPhase.TOLD, "")]
+
+
+def test_ranges_of_one_instant_share_what_the_last_of_them_says() -> None:
+    poses, innovations, starts = np.zeros(5, POSE), np.zeros(4, INNOVATION), np.zeros(3, OPEN)
+    poses["row"], poses["t_ns"], poses["speed"] = [2, 0, 0, 0, 1], [1, 1, 300_000_001, 300_000_001, 1], 2.0
+    innovations["row"], innovations["t_ns"] = [2, 0, 0, 0], [1, 1, 300_000_001, 300_000_001]
+    innovations["S"], innovations["fused"], innovations["innovation"] = 1.0, True, [0.0, 0.0, 9.0, 1.0]
+    innovations["kind"] = MeasurementKind.RANGE
+    starts["is_open"] = [True, False, True]
+    rows = np.zeros(len(poses), np.int64)
+    assert follow_starts(poses, innovations, starts, rows) == (2, False)
+    assert rows[:2].tolist() == [2, 0]
+    assert starts["agreed_s"].tolist() == pytest.approx([0.3, 0.0, 0.0])
+    assert starts["agreed_m"].tolist() == pytest.approx([0.6, 0.0, 0.0])
+    assert starts["last_ns"].tolist() == [300_000_001, 0, 1]
