@@ -9,12 +9,13 @@ from dropanchor_service.estimation.columns import Array
 
 STREAM: Final = 71  # random stream of the disturbances
 LASTING_TAU: Final = 3.0  # s
-WHITE, LASTING, MEAN, MOUNT = "white", "lasting", "mean", "mount"
+WHITE, LASTING, MEAN, MOUNT, BIAS = "white", "lasting", "mean", "mount", "bias"
 RANGE_ERRORS: Final = ("white0.5", "white1", "lasting0.5", "lasting1", "mean5", "mean10")  # m; m; ranges
 PATHS: Final = ("nlos10", "nlosburst", "outage5")
 HEADINGS: Final = ("hcorr", "gdrift")
 FIELD: Final = (*PATHS, *HEADINGS, "magdist")
 """Typical problems in the field, which the simulator makes: its perturbations of these names."""
+BIASES: Final = ("bias0.03",)  # rad/s, standard deviation of the gyroscope's bias
 MOUNTS: Final = ("mount90", "mount-90", "mount135", "mount180")  # degrees
 
 

@@ -6,7 +6,7 @@ from fnmatch import fnmatchcase
 from itertools import product
 from pathlib import Path
 
-from dropanchor_evaluation.product.disturbances import FIELD, HEADINGS, MOUNTS, PATHS, RANGE_ERRORS
+from dropanchor_evaluation.product.disturbances import BIASES, FIELD, HEADINGS, MOUNTS, PATHS, RANGE_ERRORS
 from dropanchor_evaluation.recordings import recordings_in
 
 DEVELOPMENT_SEEDS = range(5000, 6000)
@@ -75,8 +75,10 @@ def simulated_rows() -> list[Row]:
         *((f"S5+{what}", "scalar", "nothing") for what in HEADINGS),
         *((f"S5+{what}", "9-axis", "nothing") for what in FIELD if what != "hcorr"),  # that is of platforms' headings
     ]
+    biased = [(f"{motion}+{what}", "9-axis", "nothing") for motion in ("S5", "forklift") for what in BIASES]
     turned = [(f"{motion}+{what}", "9-axis", "nothing") for motion in TURNED for what in MOUNTS]
-    return [Row(*what, start) for what in (*fast, *full, *loose, *bare, *noisy, *hard, *turned) for start in STARTS]
+    every = (*fast, *full, *loose, *bare, *noisy, *hard, *biased, *turned)
+    return [Row(*what, start) for what in every for start in STARTS]
 
 
 def recorded_rows(data: Path) -> list[Row]:

@@ -89,6 +89,8 @@ def sensor_models(row: Row) -> SensorModels:
     models = models if row.sensors == BARE else calibrated(models)
     if row.disturbance in disturbances.FIELD:
         models = perturbed(models, row.disturbance)
+    if (std := disturbances.size(row.disturbance, disturbances.BIAS)) is not None:
+        models = replace(models, imu=replace(models.imu, gyro_bias_std=std))
     return smooth(models) if row.scenario == "rolling" else models
 
 

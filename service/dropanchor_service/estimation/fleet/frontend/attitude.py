@@ -47,6 +47,7 @@ TAU_GRAVITY = 30.0  # s
 SETTLE = 1.0  # s of running mean after switch-on
 SETTLED = 2.0 * TAU  # s, age from which the tilt is known
 TILT_SD = 0.045  # rad, of the tilt that the first samples give
+LEVEL_BIAS_SD = 0.01  # rad/s, of the bias about a level axis: as much as tilt may teach
 TILT_WALK, BIAS_WALK = 1e-5, 2e-9  # rad^2/s, (rad/s)^2/s
 TILT_NOISE, TILT_NOISE_REST = 5e-3, 1e-3  # rad^2 s, of an accelerometer that says where up is
 ROUGH_NOISE = 0.5  # rad^2 s per (m/s^2)^2 of roughness

@@ -7,11 +7,11 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.attitude import ATTITUDE, TILT_SD, level_attitude
+from dropanchor_service.estimation.fleet.frontend.attitude import ATTITUDE, LEVEL_BIAS_SD, TILT_SD, level_attitude
 from dropanchor_service.estimation.fleet.frontend.carrying import AUTO, CARRYING, start_carrying
 from dropanchor_service.estimation.fleet.frontend.field import MAGNETOMETER
 from dropanchor_service.estimation.fleet.frontend.preintegration import G0, PREINTEGRATION
-from dropanchor_service.estimation.fleet.frontend.standstill import BIAS_SD, STANDSTILL, start_standstill
+from dropanchor_service.estimation.fleet.frontend.standstill import STANDSTILL, start_standstill
 
 FRONTEND = np.dtype(
     [
@@ -52,7 +52,7 @@ def start_frontend(f: Frontend, hard_iron: float, declination: float, motion: in
     f.hard_iron = hard_iron
     f.declination = declination
     f.attitude.age = 0.0
-    f.attitude.tilt_cov[0], f.attitude.tilt_cov[1], f.attitude.tilt_cov[2] = TILT_SD * TILT_SD, 0.0, BIAS_SD * BIAS_SD
+    f.attitude.tilt_cov[:] = TILT_SD * TILT_SD, 0.0, LEVEL_BIAS_SD * LEVEL_BIAS_SD
     f.turned = 0.0
     f.drift_var = 0.0
     f.drift_cov = 0.0

@@ -7,6 +7,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.belief.heading_reference import adopt_reference
 from dropanchor_service.estimation.fleet.belief.layout import GYRO_BIAS, MOUNT, REFERENCE, YAW, N, R
 from dropanchor_service.estimation.fleet.frontend.node import NODE
+from dropanchor_service.estimation.fleet.frontend.standstill import BIAS_SD
 from dropanchor_service.estimation.fleet.measurement.rest import update_standstill
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.frontend import new_frontend, run
@@ -61,6 +62,6 @@ def test_a_bias_learned_at_rest_comes_with_its_step() -> None:
     acc = np.tile([0.0, 0.0, 9.80665], (len(t), 1)) + 0.01 * rng.standard_normal((len(t), 3))
     gyro = np.tile([0.0, 0.0, 0.006], (len(t), 1)) + 0.002 * rng.standard_normal((len(t), 3))
     nodes = run(new_frontend(), Motion(t, acc, gyro, np.full((len(t), 3), np.nan), None), np.arange(0.1, 5.9, 0.1))
-    assert nodes["gyro_bias_var"][0] == pytest.approx(0.01**2, rel=0.05)
+    assert nodes["gyro_bias_var"][0] == pytest.approx(BIAS_SD**2, rel=0.05)
     assert nodes["gyro_bias_var"][-1] < 0.003**2
     assert nodes["gyro_bias_step"].sum() == pytest.approx(0.006, abs=0.001)

@@ -42,7 +42,7 @@ def test_hard_iron_as_large_as_the_field_is_found_and_the_heading_becomes_absolu
     assert not absolute[:10].any()
     assert absolute[ends > 10].all()
     e = heading_error(m, nodes, ends)
-    assert abs(e[ends > 15]).max() < math.radians(3)
+    assert abs(e[ends > 15]).max() < math.radians(3.2)
     assert abs(e[absolute] / np.sqrt(nodes["heading_var"][absolute])).max() < 3
     assert rows[0]["magnetometer"]["x"][3:5] == pytest.approx(IRON[:2], abs=0.03)
 
