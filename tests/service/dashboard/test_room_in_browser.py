@@ -54,6 +54,15 @@ def height(part: Locator) -> float:
     return box["height"]
 
 
+def settled_height(page: WatchedPage, part: Locator) -> float:
+    """Return the height once it stays: the details grow when the explanation of the tag has come."""
+    before = -1.0
+    while height(part) != before:
+        before = height(part)
+        page.page.wait_for_timeout(600)  # explanations are asked for twice a second
+    return before
+
+
 def width(part: Locator) -> float:
     box = part.bounding_box()
     assert box is not None
@@ -91,7 +100,7 @@ def test_six_rows_and_the_buttons_that_save_stay_in_view_and_the_bars_remember_w
         assert here.evaluate(IS_UNCOVERED)
         assert here.evaluate("here => here.compareDocumentPosition(document.querySelector('.plots')) & 4")
 
-        before = height(detail)
+        before = settled_height(page, detail)
         bar = page.page.get_by_role("separator", name="Height of the details")
         drag(page, bar, -120)
         dragged = height(detail)
