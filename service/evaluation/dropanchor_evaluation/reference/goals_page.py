@@ -89,7 +89,11 @@ GOALS: Final = (
     ),
     Goal("M5/9-axis/everything/known", _WHOLE, 0.40, None, "as S5"),
 )
-_VEHICLES = tuple(f"{motion}*/*" for motion in ("P", "S5", "M5", "OU", "C5", "forklift"))
+_VEHICLES = tuple(
+    f"{motion}{suffix}/*"
+    for motion in ("P", "S5", "M5", "OU", "C5", "forklift")
+    for suffix in ("", "-100Hz", "+[whlmno]*")
+)
 HONEST: Final = (
     Honesty(
         "vehicles",
@@ -97,6 +101,12 @@ HONEST: Final = (
         "errors of ranges that last, and the lag of a firmware that averages, are learned after some seconds only; "
         "single tags that pass near the anchor or cross the line of sight: linear updates take an error of the course "
         "for a lower speed there",
+    ),
+    Honesty(
+        "a gyroscope that is worse than the prior says",
+        ("*+bias*/*", "*+gdrift/*"),
+        "a bias above 0.05 rad/s looks like the slow turn of a hand, so a rest does not teach it; none is expected to "
+        "swing by 0.03 rad/s within a minute",
     ),
     Honesty("smooth rolling", ("rolling*/*",), "a gyroscope that no rest teaches"),
     Honesty("carried in the hand", ("walk-hand/*",), "with an unknown start few poses are `tracking`"),
