@@ -16,6 +16,7 @@ from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.recording.mcap_file import McapFile
 from dropanchor_service.recording.reading import RecordingReader
 from dropanchor_service.settings.sources import load_settings
+from dropanchor_tag_client.recording import RecordingError
 from support.patience import PATIENCE_S
 from support.service import running_service, settings_file, straight_north
 from support.zenoh_router import connected_session, wait_until
@@ -25,7 +26,10 @@ S = 1_000_000_000
 
 def on_disk(folder: Path) -> tuple[int, int]:
     """Return how many messages and poses are in the recording so far, of which a kill leaves whole chunks."""
-    turns = [turn for file in folder.glob("*.mcap") for turn in RecordingReader(file).turns()]
+    try:
+        turns = [turn for file in folder.glob("*.mcap") for turn in RecordingReader(file).turns()]
+    except RecordingError:  # not even its header is on the disk yet
+        return 0, 0
     return sum(len(turn.messages) for turn in turns), sum(len(turn.estimates) for turn in turns)
 
 

@@ -1,5 +1,6 @@
 """What contract tests of REST share: an application with all its parts, and rules that a schema cannot express."""
 
+import atexit
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -89,4 +90,7 @@ def contract_app(folder: Path, site: str = "default") -> FastAPI:
     bench.recorder.writer.flush()
     bench.stopping.set()  # a stream ends after its first event
     basemap = ServedBasemap(basemap_file(folder / "map.pmtiles", {(0, 0, 0): image_tile((0, 0, 0))}), None)
+    atexit.register(
+        basemap.file.close
+    )  # applications live as long as their module's fixtures, and are freed any time later
     return bench.app(basemap=basemap)
