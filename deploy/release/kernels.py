@@ -60,7 +60,6 @@ def compile_kernels(sources: Path, into: Path) -> None:
 
 def build_kernels(into: Path) -> Path | None:
     """Build the wheel into a folder. Return it, or None where the processor belongs to no family that is known."""
-
     processor = family()
     if processor is None:
         return None

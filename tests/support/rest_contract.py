@@ -90,7 +90,5 @@ def contract_app(folder: Path, site: str = "default") -> FastAPI:
     bench.recorder.writer.flush()
     bench.stopping.set()  # a stream ends after its first event
     basemap = ServedBasemap(basemap_file(folder / "map.pmtiles", {(0, 0, 0): image_tile((0, 0, 0))}), None)
-    atexit.register(
-        basemap.file.close
-    )  # applications live as long as their module's fixtures, and are freed any time later
+    atexit.register(basemap.file.close)  # the application is freed any time after the tests of its module
     return bench.app(basemap=basemap)

@@ -62,10 +62,7 @@ UNKNOWN = (
     "slip_std",
     "speed_max",
     "heading_std",
-    "start_x",
-    "start_y",
-    "start_heading",
-    "start_std",
+    *(f"start_{name}" for name in ("x", "y", "heading", "std")),
 )  # NaN by default
 
 POSE = np.dtype(

@@ -78,7 +78,7 @@ def use_processor_family() -> None:
 
 
 def _take_shipped(folder: Path) -> None:
-    """Fill an empty cache with kernels that were compiled elsewhere, where they are for this process."""
+    """Fill a cache that is not full with kernels that were compiled elsewhere, where they are for this process."""
     if CPU not in os.environ or shipped() is None or (mark := mark_of(folder)).exists():
         return
     try:

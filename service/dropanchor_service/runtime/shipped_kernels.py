@@ -6,6 +6,7 @@ of processors instead, which gives the same bits, and copied to where numba look
 
 import hashlib
 import importlib.util
+import os
 import platform
 import shutil
 import sys
@@ -69,10 +70,15 @@ def collect(cache: Path, into: Path, needs: str, sources: Path) -> None:
 
 
 def _copy_files(origin: Path, into: Path) -> None:
-    """Copy the files of a folder without its permissions: an installation is often read-only, and a cache is not."""
+    """Copy the files of a folder without its permissions: an installation is often read-only, and a cache is not.
+
+    Each appears whole: another process may copy the same, or read what it has copied.
+    """
     into.mkdir(parents=True, exist_ok=True)
     for file in origin.iterdir():
-        shutil.copyfile(file, into / file.name)
+        part = into / f"{file.name}.{os.getpid()}"
+        shutil.copyfile(file, part)
+        part.replace(into / file.name)
 
 
 def _folders(sources: Path) -> Iterator[tuple[Path, str]]:

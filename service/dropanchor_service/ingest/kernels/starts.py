@@ -14,9 +14,7 @@ MOVING_M: Final = 3.0
 STANDING_S: Final = 10.0
 SETTLED_M: Final = 50.0  # way over which the ranges agreed: then a contradiction is no longer one of the start
 MAX_NIS: Final = 9.0  # of a range that agrees: three standard deviations
-MAX_LASTING_M: Final = (
-    0.5  # of errors of ranges that last: while they are believed to be larger, ranges confirm nothing
-)
+MAX_LASTING_M: Final = 0.5  # of errors of ranges that last: if they are believed to be larger, ranges confirm nothing
 MAX_STEP_S: Final = 0.5  # between two ranges: a longer silence says nothing about the way
 
 OPEN: Final = np.dtype(
