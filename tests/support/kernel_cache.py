@@ -41,6 +41,9 @@ def use_cache_of_these_sources() -> None:
     ]
     digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources))
     os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / digest.hexdigest()[:16]))
+    from dropanchor_service.estimation.fleet.compiled import Inner
+
+    Inner.called_from_python = True
 
 
 @functools.cache

@@ -64,13 +64,13 @@ class Simulation:
         )
 
 
-def simulate(scenario: str, seed: int, models: SensorModels | None = None) -> Simulation:
+def simulate(scenario: str, seed: int, models: SensorModels | None = None, rest_s: float = 0.0) -> Simulation:
     """Return the run of a scenario with these sensors (default: SensorModels()). Raises UnknownScenarioError.
 
-    The result depends only on the arguments.
+    rest_s: s for which the tag lies still before. The result depends only on the arguments.
     """
     models = models or SensorModels()
-    motion = trajectory(scenario, seed)
+    motion = trajectory(scenario, seed).after_rest(rest_s)
     if models.imu.hz is not None:
         motion = motion.at(sample_times(motion, models.imu.hz))
     return observe(scenario, seed, motion, models)

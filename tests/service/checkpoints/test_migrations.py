@@ -19,7 +19,7 @@ from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from support.golden_checkpoint import Drive, golden, halves
 
 EARLIER = f"{layouts.VERSION - 1}-{'0' * 16}"
-LAYOUT = "7-24fbf17b9c6cc19f"
+LAYOUT = "7-79ee0dd3b3097a7f"
 READ = range(layouts.VERSION - layouts.READ_BEFORE, layouts.VERSION)
 
 

@@ -9,19 +9,27 @@ from dropanchor_service.estimation.columns import Array
 
 STREAM: Final = 71  # random stream of the disturbances
 LASTING_TAU: Final = 3.0  # s
-WHITE, LASTING, MEAN, MOUNT, BIAS = "white", "lasting", "mean", "mount", "bias"
+WHITE, LASTING, MEAN, MOUNT, BIAS, RESTED = "white", "lasting", "mean", "mount", "bias", "rested"
 RANGE_ERRORS: Final = ("white0.5", "white1", "lasting0.5", "lasting1", "mean5", "mean10")  # m; m; ranges
 PATHS: Final = ("nlos10", "nlosburst", "outage5")
 HEADINGS: Final = ("hcorr", "gdrift")
 FIELD: Final = (*PATHS, *HEADINGS, "magdist")
 """Typical problems in the field, which the simulator makes: its perturbations of these names."""
-BIASES: Final = ("bias0.03",)  # rad/s, standard deviation of the gyroscope's bias
+BIASES: Final = ("bias0.03", "rested0.1")
+"""Standard deviations of the gyroscope's bias, rad/s; rested: after a rest of `REST_S`."""
+REST_S: Final = 5.0  # s that a tag lies where somebody has put it, before it moves
 MOUNTS: Final = ("mount90", "mount-90", "mount135", "mount180")  # degrees
 
 
 def size(disturbance: str, kind: str) -> float | None:
     """Return the number after the kind in the name of a disturbance, or None if it is of another kind."""
     return float(disturbance.removeprefix(kind)) if disturbance.startswith(kind) else None
+
+
+def gyro_bias_std(disturbance: str) -> float | None:
+    """Return the standard deviation of the gyroscope's bias, rad/s, that a disturbance says, or None."""
+    std = size(disturbance, BIAS)
+    return size(disturbance, RESTED) if std is None else std
 
 
 def mounting_angle(disturbance: str) -> float | None:

@@ -76,6 +76,7 @@ def simulated_rows() -> list[Row]:
         *((f"S5+{what}", "9-axis", "nothing") for what in FIELD if what != "hcorr"),  # that is of platforms' headings
     ]
     biased = [(f"{motion}+{what}", "9-axis", "nothing") for motion in ("S5", "forklift") for what in BIASES]
+    biased += [("S5+rested0.1", "6-axis", "nothing")]
     turned = [(f"{motion}+{what}", "9-axis", "nothing") for motion in TURNED for what in MOUNTS]
     every = (*fast, *full, *loose, *bare, *noisy, *hard, *biased, *turned)
     return [Row(*what, start) for what in every for start in STARTS]

@@ -78,7 +78,8 @@ def _simulated(row: Row, seed: int) -> Simulation:
         return simulate_walk(row.scenario.removeprefix("walk-"), seed, walking_sensors(models))  # type: ignore[arg-type]
     turned = disturbances.mounting_angle(row.disturbance)
     mount = mounting_angle(seed) if turned is None else turned
-    return simulate(row.scenario, seed, replace(models, mount_rad=mount))
+    rest_s = disturbances.REST_S if row.disturbance.startswith(disturbances.RESTED) else 0.0
+    return simulate(row.scenario, seed, replace(models, mount_rad=mount), rest_s)
 
 
 def sensor_models(row: Row) -> SensorModels:
@@ -89,7 +90,7 @@ def sensor_models(row: Row) -> SensorModels:
     models = models if row.sensors == BARE else calibrated(models)
     if row.disturbance in disturbances.FIELD:
         models = perturbed(models, row.disturbance)
-    if (std := disturbances.size(row.disturbance, disturbances.BIAS)) is not None:
+    if (std := disturbances.gyro_bias_std(row.disturbance)) is not None:
         models = replace(models, imu=replace(models.imu, gyro_bias_std=std))
     return smooth(models) if row.scenario == "rolling" else models
 

@@ -16,6 +16,7 @@ from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.attitude import (
     TAU,
     TILT_SD,
+    Attitude,
     correct_tilt,
     predict_attitude,
     up_in_body,
@@ -33,6 +34,7 @@ from dropanchor_service.estimation.fleet.frontend.carrying import (
     yaw_of_carried,
 )
 from dropanchor_service.estimation.fleet.frontend.field import forget_turning, spread_yaw_on_arc
+from dropanchor_service.estimation.fleet.frontend.large_bias import found_large_bias, may_be_at_rest
 from dropanchor_service.estimation.fleet.frontend.level_ride import learn_from_level_ride
 from dropanchor_service.estimation.fleet.frontend.magnetometer import north_of, update_magnetometer
 from dropanchor_service.estimation.fleet.frontend.node import (
@@ -96,6 +98,23 @@ def learn_gyro_bias(f: Frontend, dt: float, gyro: Array, heard: bool) -> None:
 
 
 @njit(cache=True, nogil=True)
+def vertical_bias(a: Attitude) -> float:
+    """Return the gyroscope's bias about the vertical, rad/s."""
+    x, y, z = up_in_body(a.q)
+    return x * a.bias[0] + y * a.bias[1] + z * a.bias[2]  # type: ignore[no-any-return]
+
+
+@njit(cache=True, nogil=True)
+def learn_large_bias(f: Frontend, dt: float, gyro: Array, mag: Array) -> None:
+    """Take a bias that is too large for the standstill to see a rest, and begin to look for north anew."""
+    a = f.attitude
+    if found_large_bias(f.large_bias, f.standstill, dt, gyro, a.bias, mag, a.q):
+        f.bias_end = vertical_bias(a)  # no hypothesis has taken it for a change of a known bias
+        f.magnetometer.unit = 0.0
+        f.magnetometer.x[:] = 0.0
+
+
+@njit(cache=True, nogil=True)
 def is_frozen(f: Frontend, dt: float, acc: Array, gyro: Array) -> bool:
     """Return whether the IMU repeats its last sample, which must not look like a tag at rest."""
     same = True
@@ -104,6 +123,19 @@ def is_frozen(f: Frontend, dt: float, acc: Array, gyro: Array) -> bool:
         f.last[i], f.last[3 + i] = acc[i], gyro[i]
     f.frozen_s = f.frozen_s + dt if same else 0.0
     return f.frozen_s > FROZEN  # type: ignore[no-any-return]
+
+
+@njit(cache=True, nogil=True)
+def use_acceleration(f: Frontend, dt: float, acc: Array, rest: bool) -> None:
+    """Correct the tilt with a sample, m/s^2, and integrate it. rest: confirmed."""
+    a, s, p, c = f.attitude, f.standstill, f.preintegration, f.carrying
+    taken = correct_tilt(a, dt, acc[0], acc[1], acc[2], rest, p.acc_var, tilt_tau(c, p.acc_var))
+    p.tilt_gain += 0.0 if rest else taken
+    add_acceleration(p, dt, a.q, acc, a.gravity, s)
+    if c.motion != VEHICLE:
+        add_carried_sample(c, dt, acc, p.a, a.q, a.gravity, s.quiet == 0.0)
+    if may_be_at_rest(f.large_bias, s):
+        p.no_acc_s += dt  # where up is depends on it
 
 
 @njit(cache=True, nogil=True)
@@ -136,15 +168,13 @@ def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> i
         s.quiet = 0.0
         p.no_acc_s += dt
     if c.carried == 0:  # the hand of somebody who stands turns slowly, which is no bias
+        if heard:
+            learn_large_bias(f, dt, gyro, mag)
         learn_gyro_bias(f, dt, gyro, heard)
     rest = s.quiet > CONFIRM and c.carried == 0
     predict_attitude(a, dt, gyro, rest)
     if heard:
-        taken = correct_tilt(a, dt, acc[0], acc[1], acc[2], rest, p.acc_var, tilt_tau(c, p.acc_var))
-        p.tilt_gain += 0.0 if rest else taken
-        add_acceleration(p, dt, a.q, acc, a.gravity, s)
-        if c.motion != VEHICLE:
-            add_carried_sample(c, dt, acc, p.a, a.q, a.gravity, s.quiet == 0.0)
+        use_acceleration(f, dt, acc, rest)
     p.yaw_rate = 0.0 if rest else carried_rate(a) if c.carried == 1 else yaw_rate_of(a)
     update_magnetometer(f.magnetometer, dt, a.q, mag, rest, f.hard_iron, s.bias_var)
     return USED
@@ -192,8 +222,7 @@ def fill_unknown(dt: float, node: Node) -> None:
 @njit(cache=True, nogil=True)
 def fill_gyro_bias(f: Frontend, node: Node) -> None:
     """Fill the variance of the gyroscope's bias about the vertical, its change in this node, and the tilt it causes."""
-    x, y, z = up_in_body(f.attitude.q)
-    bias = x * f.attitude.bias[0] + y * f.attitude.bias[1] + z * f.attitude.bias[2]
+    bias = vertical_bias(f.attitude)
     node.gyro_bias_var = f.standstill.bias_var
     node.gyro_bias_step = bias - f.bias_end if at_rest(f.standstill) else 0.0
     f.bias_end = bias

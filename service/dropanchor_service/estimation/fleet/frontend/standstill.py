@@ -98,6 +98,12 @@ def update_still(s: Standstill, k: float, acc: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
+def is_steady(s: Standstill) -> bool:
+    """Return whether the tag neither shakes nor changes its rates. It may turn evenly."""
+    return s.still_var < ACC_SD * ACC_SD and s.gyro_bias_var < GYRO_SD * GYRO_SD  # type: ignore[no-any-return]
+
+
+@njit(cache=True, nogil=True)
 def update_standstill_detector(s: Standstill, dt: float, acc: Array, gyro: Array, bias: Array) -> None:
     """Update with one IMU sample. Then `s.quiet` is the time, s, for which the tag has been quiet."""
     if dt == 0.0:
@@ -114,9 +120,7 @@ def update_standstill_detector(s: Standstill, dt: float, acc: Array, gyro: Array
     s.gyro_bias_var += k * (vg - s.gyro_bias_var)
     x, y, z = s.mean[3] - bias[0], s.mean[4] - bias[1], s.mean[5] - bias[2]
     limit = RATE_KNOWN + min(RATE, 3.0 * math.sqrt(s.bias_var))
-    calm = (
-        s.still_var < ACC_SD * ACC_SD and s.gyro_bias_var < GYRO_SD * GYRO_SD and x * x + y * y + z * z < limit * limit
-    )
+    calm = is_steady(s) and x * x + y * y + z * z < limit * limit
     share = s.still_var / (ACC_SD * ACC_SD)
     quiet = s.quiet + (dt if share < CLEAR else dt / DOUBT) if calm and s.seen > TAU else 0.0
     if not s.quiet <= HOLD < quiet or share < SURE:  # else this sample would begin a rest near the limit

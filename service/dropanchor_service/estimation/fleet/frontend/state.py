@@ -10,6 +10,7 @@ from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.attitude import ATTITUDE, LEVEL_BIAS_SD, TILT_SD, level_attitude
 from dropanchor_service.estimation.fleet.frontend.carrying import AUTO, CARRYING, start_carrying
 from dropanchor_service.estimation.fleet.frontend.field import MAGNETOMETER
+from dropanchor_service.estimation.fleet.frontend.large_bias import LARGE_BIAS, start_large_bias
 from dropanchor_service.estimation.fleet.frontend.preintegration import G0, PREINTEGRATION
 from dropanchor_service.estimation.fleet.frontend.standstill import STANDSTILL, start_standstill
 
@@ -17,6 +18,7 @@ FRONTEND = np.dtype(
     [
         ("attitude", ATTITUDE),
         ("standstill", STANDSTILL),
+        ("large_bias", LARGE_BIAS),
         ("magnetometer", MAGNETOMETER),
         ("preintegration", PREINTEGRATION),
         ("carrying", CARRYING),
@@ -69,6 +71,7 @@ def start_at(f: Frontend, t_ns: int, acc: Array, gyro: Array) -> None:
     f.bias_end = 0.0
     a.gravity = G0
     start_standstill(s, acc, gyro)
+    start_large_bias(f.large_bias)
     p.V[:] = 0.0
     p.a[:] = 0.0
     p.V_end[:] = 0.0
