@@ -5,6 +5,8 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
+COMPILED := $(VENV)/compiled
+KERNELS := $(shell find service/dropanchor_service/estimation service/dropanchor_service/zones service/dropanchor_service/*/kernels -name '*.py')
 DISTRIBUTIONS := -e schemas -e tag_client -e service/evaluation -e 'service[cluster,evaluation,foxglove,maps,mqtt,parquet,postgresql,ros2,s3]'
 PACKAGES := schemas/dropanchor_schemas tag_client/dropanchor_tag_client service/dropanchor_service service/evaluation/dropanchor_evaluation
 PARALLEL := -n 6 --dist loadfile --no-loadscope-reorder
@@ -31,9 +33,9 @@ help:
 	@echo 'make dist     build the release, twice, and see that it comes out the same; make test-dist installs it'
 	@echo 'make results  measure everything in $(RESULTS) again: hours, on a machine that does nothing else'
 	@echo 'make pictures photograph the page for the README, when make check says that the page has changed'
-	@echo 'make install  the set-up alone: a virtual environment in $(VENV)'
+	@echo 'make install  the set-up alone: a virtual environment in $(VENV), and the estimator compiled'
 
-install: $(STAMP)
+install: $(COMPILED)
 
 $(STAMP): $(PYPROJECTS)
 	@test -n '$(PYTHON)' || { echo 'Dropanchor needs Python 3.11 or newer; none was found. Install one, or: make PYTHON=/path/to/python3.11 $(MAKECMDGOALS)' >&2; exit 1; }
@@ -45,14 +47,20 @@ $(STAMP): $(PYPROJECTS)
 		{ echo 'The installation failed: is the network up? Then run the same make command again.' >&2; exit 1; }
 	@touch $@
 
+# Here and not at the first start, which then takes seconds. Tests have a cache of their own.
+$(COMPILED): $(STAMP) $(KERNELS)
+	@echo '== compiling the estimator (again after each change of it)'
+	@$(BIN)/dropanchor compile
+	@touch $@
+
 demo: install
 	@exec $(BIN)/dropanchor demo $(DEMO)
 
-docs: install
+docs: $(STAMP)
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --config-file service/mkdocs.yml
 	@echo 'The pages are in build/docs: $(BIN)/python -m http.server --bind 127.0.0.1 --directory build/docs'
 
-kernels: install
+kernels: $(STAMP)
 	@PYTHONPATH=tests $(BIN)/python -m support.kernel_cache
 
 chromium:
@@ -87,11 +95,11 @@ postgresql:
 		apt-get update -qq && apt-get install -y -qq postgresql >/dev/null; } || \
 		echo 'The tests with a database need the package postgresql: without it they are skipped.' >&2
 
-test: install $(if $(FAST),,chromium mosquitto proxies postgresql kernels)
+test: $(STAMP) $(if $(FAST),,chromium mosquitto proxies postgresql kernels)
 	@echo '== running $(if $(FAST),the fast,all) tests'
 	@$(BIN)/python -m pytest $(if $(FAST),$(FAST_TESTS),$(PARALLEL)) $(PYTEST)
 
-check: install
+check: $(STAMP)
 	@$(BIN)/ruff format --check .
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy $(PACKAGES) tests
@@ -104,10 +112,10 @@ check: install
 	@$(BIN)/python -m dropanchor_evaluation.results --check
 	@PYTHONPATH=tests $(BIN)/python -m pictures --check
 
-bench: install chromium postgresql
+bench: $(STAMP) chromium postgresql
 	@$(BIN)/python -m pytest tests/benchmarks -s -m '' $(PYTEST)
 
-test-cluster: install postgresql
+test-cluster: $(STAMP) postgresql
 	@$(BIN)/python -m pytest tests/e2e/test_upgrade_on_ray.py tests/benchmarks/test_cluster_failures.py tests/benchmarks/test_cluster_of_hosts.py -s -m '' $(PYTEST)
 
 results: bench
@@ -117,7 +125,7 @@ results: bench
 	@$(BIN)/dropanchor evaluate ablate --into $(RESULTS)/ablation.md
 	@$(BIN)/dropanchor evaluate bounds --into $(RESULTS)/scenarios.md $(EVALUATE)
 
-pictures: install chromium
+pictures: $(STAMP) chromium
 	@PYTHONPATH=tests $(BIN)/python -m pictures
 
 clean:
@@ -126,7 +134,7 @@ clean:
 .PHONY: dist test-dist
 
 # A release in dist/, built twice to see that it comes out the same: deploy/release/README.md.
-dist: install
+dist: $(STAMP)
 	@PYTHONPATH=deploy $(BIN)/python -m release.build dist
 
 # Installs the wheels into an empty environment, compiles the estimator and looks at the page: minutes, and the network.

@@ -26,7 +26,7 @@ DESCRIPTION = """\
 Starts the service and simulated tags that drive around one anchor, and prints the address of the page. The tags run in
 a separate process and send raw ranges and IMU samples, like real ones. The service gets what an operator would know:
 the start of each tag, and that its IMU points ahead. With --unknown-start the service has to find the start itself.
-The first start after an update compiles the estimator, which takes about a minute. Ctrl-C stops the demo.
+The first start after an update compiles the estimator, which takes half a minute or more. Ctrl-C stops the demo.
 The engine paper runs with its tuned parameters unless the settings say otherwise, because the published parameters are
 for sensors almost without noise.
 """

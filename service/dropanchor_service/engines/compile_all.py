@@ -1,6 +1,6 @@
 """Compile all kernels, on two processors where there are two.
 
-The belief of the estimator takes longer than all else together, and the two share no kernel that takes long.
+The belief of the estimator takes as long as all else together, and the two share no kernel that takes long.
 """
 
 import subprocess
@@ -25,18 +25,16 @@ from dropanchor_service.settings.model import Settings
 def compile_all() -> None:
     """Fill the cache of the kernels."""
     use_kernel_cache()
-    with _belief_apart():
-        warm_up_ingest()
-        warm_up_answers()
-        warm_up_zones()
-        warm_up_front_end()
+    with _others_apart():
+        warm_up_belief()
     create_engine(Settings(engine="fleet"))  # loads what is compiled, and compiles what is missing
 
 
 @contextmanager
-def _belief_apart() -> Iterator[None]:
-    """Compile the belief in another process meanwhile, if there is a processor for it."""
+def _others_apart() -> Iterator[None]:
+    """Compile all but the belief in another process meanwhile, if there is a processor for it."""
     if usable_processors() < 2:
+        _warm_up_others()
         yield
         return
     with subprocess.Popen([sys.executable, "-m", __name__], stdin=subprocess.DEVNULL) as other:
@@ -47,6 +45,13 @@ def _belief_apart() -> Iterator[None]:
             raise
 
 
+def _warm_up_others() -> None:
+    warm_up_ingest()
+    warm_up_answers()
+    warm_up_zones()
+    warm_up_front_end()
+
+
 if __name__ == "__main__":
-    logs.configure()
-    warm_up_belief()
+    logs.configure("ERROR")  # the other process, which takes longer, tells of its progress
+    _warm_up_others()

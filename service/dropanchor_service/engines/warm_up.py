@@ -55,7 +55,7 @@ from dropanchor_service.zones.modes import placed
 from dropanchor_service.zones.pair_watch import PairWatch
 from dropanchor_service.zones.zone_watch import ZoneWatch
 
-ESTIMATOR = say("the_estimator", "the estimator, which takes about a minute")
+ESTIMATOR = say("the_estimator", "the estimator, which takes half a minute or more")
 _DECODER = say("the_decoder", "the decoder of messages")
 _ENCODER = say("the_encoder", "the encoder of answers")
 _ZONES = say("the_zones", "the zones")
@@ -187,7 +187,7 @@ def warm_up_belief() -> None:
 
     rows, nodes, beliefs = np.zeros(1, ROW), np.zeros(1, NODE), np.zeros(1, BELIEF)
     pool, anchors = make_pool(MAX_HYPOTHESES), np.zeros(0, ANCHOR)
-    with _compiling("the belief of the estimator", CompilationProgress()):
+    with _compiling(ESTIMATOR, CompilationProgress()):
         advance(rows, pool, nodes, anchors, Tuning().record(), make_workspace(), beliefs)
 
 

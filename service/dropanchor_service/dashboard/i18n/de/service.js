@@ -221,7 +221,7 @@ export default {
   "say.minutes": "{n} Minuten",
   "say.hours": "{n} Stunden",
   "say.compiling": "Der Dienst übersetzt {what}: bisher {seconds} s. {often}.",
-  "say.the_estimator": "den Schätzer, was etwa eine Minute dauert",
+  "say.the_estimator": "den Schätzer, was eine halbe Minute oder länger dauert",
   "say.the_decoder": "den Dekodierer der Nachrichten",
   "say.the_encoder": "den Kodierer der Antworten",
   "say.the_zones": "die Zonen",

@@ -221,7 +221,7 @@ export default {
   "say.minutes": "{n} minutes",
   "say.hours": "{n} hours",
   "say.compiling": "The service compiles {what}: {seconds} s so far. {often}.",
-  "say.the_estimator": "the estimator, which takes about a minute",
+  "say.the_estimator": "the estimator, which takes half a minute or more",
   "say.the_decoder": "the decoder of messages",
   "say.the_encoder": "the encoder of answers",
   "say.the_zones": "the zones",

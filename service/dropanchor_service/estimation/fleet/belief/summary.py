@@ -60,7 +60,7 @@ def add_arc_curvature(cov: Floats, r: float, c: float, s: float, variance: float
     cov[1, 1] += s * s * radial
 
 
-@njit(nogil=True)
+@njit(cache=True, nogil=True)
 def add_reference_variance(cov: Floats, x: float, y: float, variance: float) -> None:
     """Add a constant error of the heading reference, rad^2: it turns everything about the anchor."""
     cov[0, 0] += variance * y * y

@@ -1,0 +1,80 @@
+"""Python calls only the kernels that are made for it: a call of another one would be refused, or end the process."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dropanchor_service.estimation.fleet import compiled
+
+SERVICE = Path(__file__).parents[3] / "service"
+MAKER = "dropanchor_service.estimation.fleet.compiled"
+ROOTS = (SERVICE, SERVICE / "evaluation")
+SOURCES = sorted(path for root in ("dropanchor_service", "evaluation") for path in (SERVICE / root).rglob("*.py"))
+TREES = {path: ast.parse(path.read_text()) for path in SOURCES}
+
+
+def module_of(path: Path) -> str:
+    root = next(root for root in reversed(ROOTS) if path.is_relative_to(root))
+    return ".".join(path.relative_to(root).with_suffix("").parts)
+
+
+def is_kernel(function: ast.FunctionDef) -> bool:
+    return any("njit" in ast.unparse(decorator) for decorator in function.decorator_list)
+
+
+def inner_kernels() -> set[tuple[str, str]]:
+    """Return module and name of the kernels that only kernels may call."""
+    return {
+        (module_of(path), node.name)
+        for path, tree in TREES.items()
+        if any(isinstance(node, ast.ImportFrom) and node.module == MAKER for node in tree.body)
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef) and is_kernel(node)
+        if "cache=True" not in ast.unparse(node.decorator_list[0])
+    }
+
+
+def names_outside_of_kernels(node: ast.AST) -> Iterator[str]:
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.FunctionDef) and is_kernel(child):
+            continue
+        if isinstance(child, ast.Name) and isinstance(child.ctx, ast.Load):
+            yield child.id
+        yield from names_outside_of_kernels(child)
+
+
+def test_python_calls_no_inner_kernel() -> None:
+    inner = inner_kernels()
+    assert len(inner) > 300
+    called = []
+    for path, tree in TREES.items():
+        known = {name: (module_of(path), name) for module, name in inner if module == module_of(path)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom):
+                known |= {
+                    alias.asname or alias.name: (node.module or "", alias.name)
+                    for alias in node.names
+                    if (node.module, alias.name) in inner
+                }
+        called += [(path.name, known[name]) for name in names_outside_of_kernels(tree) if name in known]
+
+    assert called == [], "give them cache=True, which makes them callable"
+
+
+def test_a_call_of_an_inner_kernel_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled.Inner, "called_from_python", False)
+
+    @compiled.njit()
+    def double(x: float) -> float:
+        return 2.0 * x
+
+    @compiled.njit(cache=True)
+    def quadruple(x: float) -> float:
+        return double(double(x))
+
+    assert quadruple(np.pi) == 4 * np.pi
+    with pytest.raises(TypeError, match="only kernels call double"):
+        double(1.0)
