@@ -28,7 +28,7 @@ class LatestPoses:
         self._hypotheses = np.zeros((0, MAX_HYPOTHESES), HYPOTHESIS)
         self._hypothesis_counts = np.zeros(0, np.int64)
         self._history = PoseHistory()
-        self._innovations = RowRings(INNOVATION, MAX_INNOVATIONS, MAX_INNOVATION_BYTES)
+        self._innovations = RowRings(INNOVATION, MAX_INNOVATIONS, MAX_INNOVATION_BYTES, wide=("measured",))
         self._version = 0
         self._told: list[Callable[[], None]] = []
 

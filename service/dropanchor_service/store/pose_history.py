@@ -8,14 +8,14 @@ from dropanchor_service.store.rings import RowRings
 
 SPACING_NS = 250_000_000
 MAX_POSES = 256  # per tag: one minute
-MAX_BYTES = 128 * 2**20  # a minute for 2,500 tags, a few seconds for 20,000
+MAX_BYTES = 128 * 2**20  # a minute for 4,000 tags, some ten seconds for 20,000
 
 
 class PoseHistory:
     """Keeps one pose per quarter of a second. Not thread-safe: its owner locks."""
 
     def __init__(self) -> None:
-        self._rings = RowRings(POSE, MAX_POSES, MAX_BYTES)
+        self._rings = RowRings(POSE, MAX_POSES, MAX_BYTES, wide=("x", "y", "z"))
         self._first_of_slot = FirstOfSlot(SPACING_NS)
 
     def write(self, poses: Array) -> None:

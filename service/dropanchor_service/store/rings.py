@@ -1,9 +1,11 @@
 """Ring buffers with the last records of every row, in bounded memory."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.store.records import enlarged, put, take
+from dropanchor_service.store.records import enlarged, narrow, put, take
 
 MIN_DEPTH = 2  # records per row, however many rows there are
 FEW = 128  # entries up to which a loop of Python is the faster one
@@ -15,12 +17,16 @@ class RowRings:
     The more rows there are, the fewer records each row keeps, so that all rows fit into `max_bytes`.
     """
 
-    def __init__(self, dtype: "np.dtype[np.void]", max_depth: int, max_bytes: int) -> None:
-        """Create empty rings. dtype: of a record, with a field `row`; max_depth: records per row."""
+    def __init__(self, dtype: "np.dtype[np.void]", max_depth: int, max_bytes: int, wide: Collection[str] = ()) -> None:
+        """Create empty rings. dtype: of a record, with a field `row`; max_depth: records per row.
+
+        wide: fields that keep all their digits; other float64 are kept as float32.
+        """
+        self._dtype = dtype
         self._max_depth = max_depth
         self._max_bytes = max_bytes
         self._records: Array = np.zeros(
-            (max_depth, 0), dtype
+            (max_depth, 0), narrow(dtype, wide)
         )  # (place in the ring, row): a row with few records touches little memory
         self._counts = np.zeros(0, np.int64)
 
@@ -31,16 +37,16 @@ class RowRings:
         rows = records["row"]
         self._grow(int(rows.max()) + 1)
         number = self._counts[rows] + rank_in_row(rows)
-        put(self._records, (number % len(self._records), rows), records)
+        put(self._records, (number % len(self._records), rows), records.astype(self._records.dtype))
         self._counts[rows] = number + 1
 
     def of(self, row: int) -> Array:
         """Return a copy of the row's records, the oldest first."""
         if row >= len(self._counts):
-            return np.zeros(0, self._records.dtype)
+            return np.zeros(0, self._dtype)
         count, depth = int(self._counts[row]), len(self._records)
         kept: Array = self._records[np.arange(max(0, count - depth), count) % depth, row]
-        return kept
+        return kept.astype(self._dtype)
 
     def _grow(self, rows: int) -> None:
         if rows <= len(self._counts):

@@ -70,3 +70,18 @@ def test_after_a_clock_was_set_back_the_history_holds_only_newer_poses() -> None
     history = PoseHistory()
     history.write(poses(*(SPACING_NS * i for i in (10, 11, 12, 2, 3))))
     assert history.of(0)["t_ns"].tolist() == [SPACING_NS * 2, SPACING_NS * 3]
+
+
+def test_numbers_are_kept_with_seven_digits_or_with_all() -> None:
+    dtype = np.dtype([("row", "i4"), ("t_ns", "i8"), ("x", "f8"), ("speed", "f8"), ("cov", "f8", (2, 2))])
+    record = np.zeros(1, dtype)
+    record["t_ns"], record["x"], record["speed"], record["cov"] = 2**60 + 1, 1 / 3, 1 / 3, 1 / 3
+    rings = RowRings(dtype, max_depth=4, max_bytes=2**20, wide=("x",))
+
+    rings.write(record)
+    kept = rings.of(0)
+
+    assert kept.dtype == dtype
+    assert (kept["t_ns"][0], kept["x"][0]) == (2**60 + 1, 1 / 3)
+    assert kept["speed"][0] == np.float32(1 / 3)
+    assert (kept["cov"] == np.float32(1 / 3)).all()
