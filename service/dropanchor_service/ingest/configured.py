@@ -1,0 +1,28 @@
+"""What a row of the engine was made with."""
+
+from typing import NamedTuple
+
+from dropanchor_schemas.site import TagSettings
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.settings.engine_columns import tag_columns
+
+
+class Configured(NamedTuple):
+    """The settings of a tag and of its site."""
+
+    tag: TagSettings
+    declination_rad: float
+
+    def columns(self) -> Array:
+        """Return TAG_SETTINGS (0-d)."""
+        return tag_columns(*self)
+
+    def matters_after(self, before: "Configured") -> bool:
+        """Return whether the change from `before` matters to the engine. A name, a colour and a group do not."""
+        return self != before and self.columns().tobytes() != before.columns().tobytes()
+
+    def is_turned_from(self, before: "Configured") -> bool:
+        """Return whether the declination is all that matters to the engine in the change from `before`."""
+        return self.declination_rad != before.declination_rad and not self.matters_after(
+            before._replace(declination_rad=self.declination_rad)
+        )
