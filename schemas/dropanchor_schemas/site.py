@@ -225,7 +225,11 @@ class Site(_Settings):
 
     id: SiteId = Field(default="default", description="Id of the site in Zenoh keys.")
     name: str = Field(default="", description="Display name.")
-    declination_rad: Number = Field(default=0.0, description="Magnetic declination, positive east.")
+    declination_rad: Number = Field(
+        default=0.0,
+        description="Magnetic declination, positive east, and how far the site's axes are turned from east and north, "
+        "counter-clockwise.",
+    )
     georeference: Georeference | None = None
     anchors: list[Anchor] = Field(default=[], description="The anchors of the site.")
 

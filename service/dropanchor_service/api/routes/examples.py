@@ -72,6 +72,7 @@ EXPLANATION: dict[str, Any] = {
             },
         },
     },
+    "north": {"error_rad": -0.61, "std_rad": 0.11},
     "innovations": [
         {
             "t_ns": 1_800_000_000_000_000_000,
