@@ -30,7 +30,8 @@ class SiteNorth(_Answer):
     tags: list[TagNorth] = Field(description="The tags that tell it.")
     offered: bool = Field(
         description="Whether `learned_rad` differs from `declination_rad` by more than two standard deviations, so "
-        "that it should be the site's. To apply it, put the site with it as `declination_rad`."
+        "that it should be the site's. To apply it, put the site with `learned_rad` as `declination_rad` and `std_rad` "
+        "as `declination_std_rad`."
     )
     text: str = Field(description="The same as a sentence; empty where nothing is offered.")
     phrase: Phrase | None = Field(description="That sentence by its code.")

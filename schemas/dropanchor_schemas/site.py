@@ -230,6 +230,11 @@ class Site(_Settings):
         description="Magnetic declination, positive east, and how far the site's axes are turned from east and north, "
         "counter-clockwise.",
     )
+    declination_std_rad: NotNegative | None = Field(
+        default=None,
+        description="Standard deviation of the declination, beside the 0.1 rad that each tag may be off; null: as if "
+        "it were exact. It widens the ellipses of tags whose start was not told.",
+    )
     georeference: Georeference | None = None
     anchors: list[Anchor] = Field(default=[], description="The anchors of the site.")
 

@@ -92,7 +92,8 @@ def test_north_of_one_tag_is_offered_to_all_and_applied_by_a_change_of_the_site(
         lost_m, known = error_m(service, "other", LAST_S), service.get("/api/v1/tags/known/pose")
 
         site = service.get("/api/v1/site")
-        service.put("/api/v1/site", site | {"declination_rad": offer["learned_rad"]})
+        learned = {"declination_rad": offer["learned_rad"], "declination_std_rad": offer["std_rad"]}
+        service.put("/api/v1/site", site | learned)
         assert not service.get("/api/v1/site/north")["offered"]
         before = used(service, "other")
         send(service, "other", pieces(began_ns + 70 * S, 0.0, LAST_S))

@@ -12,6 +12,7 @@ class Configured(NamedTuple):
 
     tag: TagSettings
     declination_rad: float
+    declination_std_rad: float | None
 
     def columns(self) -> Array:
         """Return TAG_SETTINGS (0-d)."""
@@ -22,7 +23,5 @@ class Configured(NamedTuple):
         return self != before and self.columns().tobytes() != before.columns().tobytes()
 
     def is_turned_from(self, before: "Configured") -> bool:
-        """Return whether the declination is all that matters to the engine in the change from `before`."""
-        return self.declination_rad != before.declination_rad and not self.matters_after(
-            before._replace(declination_rad=self.declination_rad)
-        )
+        """Return whether the declination and its error are all that matters in the change from `before`."""
+        return self[1:] != before[1:] and not self.matters_after(self._replace(tag=before.tag))

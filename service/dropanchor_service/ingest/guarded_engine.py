@@ -279,7 +279,8 @@ class GuardedEngine:
     def _current(self, row: int) -> Configured:
         """Return the settings that its site has now for this row."""
         store = self._sites.of_row(row).store
-        return Configured(store.tag_settings(self._sites.rows.at(row).name), store.site.declination_rad)
+        tag, site = store.tag_settings(self._sites.rows.at(row).name), store.site
+        return Configured(tag, site.declination_rad, site.declination_std_rad)
 
 
 def _rows(samples: SampleBatch) -> Array:

@@ -232,6 +232,7 @@ def test_north_that_others_know_is_applied_with_one_click_and_may_be_undone(chro
         box.get_by_role("button", name="Apply to all tags").click()
         expect(watched.page.locator("#outcome")).to_contain_text("North of the site turned by 138°.")
         assert site.site.declination_rad == pytest.approx(-2.4)
+        assert site.site.declination_std_rad == pytest.approx(0.12, abs=0.01)
         expect(box.get_by_role("button", name="Apply to all tags")).to_be_hidden()
         watched.page.keyboard.press("Control+z")
         expect(watched.page.locator("#outcome")).to_contain_text("Undone")

@@ -98,10 +98,11 @@ def test_a_new_declination_restarts_only_rows_that_do_not_know_north_and_none_at
         bench.send(tag, Frame(ranges=[RangeSample(bench.clock.now_ns(), 1, 5.0)]))
     engine.left = {1}
     before = {row: len(made) for row, made in engine.configured.items()}
-    bench.site.set_site(bench.site.site.model_copy(update={"declination_rad": 0.4}))
+    bench.site.set_site(bench.site.site.model_copy(update={"declination_rad": 0.4, "declination_std_rad": 0.2}))
     bench.guarded_engine.follow_sites()
     made = {row: len(made) - before[row] for row, made in engine.configured.items()}
     assert made == {0: 0, 1: 1, 2: 0, 3: 1, 4: 0, 5: 1}
     assert engine.turned == {0: 0.4, 2: 0.4, 4: 0.4}
     assert [bool(engine.configured[row][-1]["start_known"]) for row in (1, 3, 5)] == [False, True, False]
     assert all(math.isclose(engine.configured[row][-1]["declination"], 0.4) for row in (1, 3, 5))
+    assert all(math.isclose(engine.configured[row][-1]["declination_std"], 0.2) for row in (1, 3, 5))

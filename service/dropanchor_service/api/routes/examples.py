@@ -190,6 +190,7 @@ SITE: dict[str, Any] = {
     "id": "default",
     "name": "Yard",
     "declination_rad": 0.07,
+    "declination_std_rad": None,
     "georeference": {"lat": 52.5123, "lon": 13.4123, "rotation_rad": 0.0},
     "anchors": [ANCHOR],
 }

@@ -12,5 +12,5 @@ export async function applyNorth(changes) {
   const { value } = await changes.read("site/north");
   if (!value.offered) return;
   const turn = compassTurn(value.learned_rad - value.declination_rad);
-  await changes.editAsIs(t("north.applied", { turn }), "site", { declination_rad: value.learned_rad });
+  await changes.editAsIs(t("north.applied", { turn }), "site", { declination_rad: value.learned_rad, declination_std_rad: value.std_rad });
 }
