@@ -76,6 +76,13 @@ class Uncertainty(_Answer):
     phrase: Phrase = Field(description="That sentence by its code.")
 
 
+class LearnedNorth(_Answer):
+    """How far north is off where the tag is, as its track tells it, which began with a told heading."""
+
+    error_rad: float = Field(description="What is to be added to the site's `declination_rad` for this tag.")
+    std_rad: float = Field(description="Standard deviation of that.")
+
+
 class SpeedTrack(_Answer):
     """Speeds of the last minute, in columns. In a very large fleet the history is shorter."""
 
@@ -101,6 +108,9 @@ class Explanation(_Answer):
     height_track: HeightTrack
     uncertainty: Uncertainty | None = Field(
         default=None, description="What its ellipse comes from; null where `sigma_parts` of the pose is."
+    )
+    north: LearnedNorth | None = Field(
+        default=None, description="null unless its track tells where north is, beside its magnetometer."
     )
     innovations: list[Innovation] = Field(description="The most recent innovations, oldest first.")
     range_errors: RangeErrors | None = Field(

@@ -225,7 +225,16 @@ class Site(_Settings):
 
     id: SiteId = Field(default="default", description="Id of the site in Zenoh keys.")
     name: str = Field(default="", description="Display name.")
-    declination_rad: Number = Field(default=0.0, description="Magnetic declination, positive east.")
+    declination_rad: Number = Field(
+        default=0.0,
+        description="Magnetic declination, positive east, and how far the site's axes are turned from east and north, "
+        "counter-clockwise.",
+    )
+    declination_std_rad: NotNegative | None = Field(
+        default=None,
+        description="Standard deviation of the declination, beside the 0.1 rad that each tag may be off; null: as if "
+        "it were exact. It widens the ellipses of tags whose start was not told.",
+    )
     georeference: Georeference | None = None
     anchors: list[Anchor] = Field(default=[], description="The anchors of the site.")
 

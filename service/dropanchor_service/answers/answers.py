@@ -97,6 +97,7 @@ class Answers:
     def forget(self, tag: Tag) -> None:
         """Remove a tag from the answers until it sends again."""
         self.tags.delete(tag.row)
+        self.tags.rows.norths.set(tag.row, None)
         self.latest.forget(tag.row)
 
     def pose_of(self, tag: Tag) -> Answer | None:

@@ -4,6 +4,7 @@ import numpy as np
 
 from dropanchor_schemas.explain import MeasurementKind as KindName
 from dropanchor_service.answers.answers import Answer, Answers
+from dropanchor_service.answers.north import cure_by_others, north_error_of
 from dropanchor_service.answers.uncertainty import uncertainty_of
 from dropanchor_service.estimation.columns import Array, MeasurementKind
 from dropanchor_service.store.tags import Tag
@@ -31,7 +32,8 @@ def explanation_of(answers: Answers, tag: Tag, last: int) -> Answer | None:
         "speed": {"speed_mps": pose["speed_mps"]} | _rates(innovations),
         "speed_track": {"t_ns": minute["t_ns"].tolist(), "speed_mps": minute["speed"].tolist()},
         "height_track": {field: minute[name].tolist() for field, name in _HEIGHT_TRACK.items()},
-        "uncertainty": uncertainty_of(pose, answers.site.tag_settings(tag.name)),
+        "uncertainty": uncertainty_of(pose, answers.site.tag_settings(tag.name), cure_by_others(answers, tag)),
+        "north": north_error_of(answers, tag),
         "innovations": _innovations(latest, [anchor.id for anchor in answers.site.anchors_by_index()]),
         "range_errors": _range_errors(innovations),
         "refused": int(np.count_nonzero(~latest["fused"])),

@@ -9,8 +9,11 @@ from dropanchor_schemas.site import TagSettings
 Answer = dict[str, Any]
 
 
-def uncertainty_of(pose: Answer, settings: TagSettings) -> Answer | None:
-    """Return the `Uncertainty` of a `Pose` in JSON, None where its engine does not tell the parts."""
+def uncertainty_of(pose: Answer, settings: TagSettings, by_others: str = "") -> Answer | None:
+    """Return the `Uncertainty` of a `Pose` in JSON, None where its engine does not tell the parts.
+
+    by_others: what other tags know about north, with what to do; empty: nothing.
+    """
     placed = pose["relative_pose"] or pose
     parts, ellipse, sigma = pose["sigma_parts"], placed["ellipse_95"], placed["sigma_pos_m"]
     if parts is None or ellipse is None or not sigma > 0.0:
@@ -18,18 +21,19 @@ def uncertainty_of(pose: Answer, settings: TagSettings) -> Answer | None:
     largest = max(Cause, key=lambda cause: parts[f"{cause}_m"])
     half = ellipse["semi_major_m"]
     part = half * parts[f"{largest}_m"] / sigma
-    text = _sentence(half, part, largest, settings)
+    of_north = largest in (Cause.NORTH, Cause.BEARING)
+    text = _sentence(half, part, largest, (of_north and by_others) or _cure(largest, settings))
     return {"half_m": half, "largest": largest, "largest_m": part, "text": text, "phrase": phrase_of(text)}
 
 
-def _sentence(half: float, part: float, largest: Cause, settings: TagSettings) -> Sentence:
+def _sentence(half: float, part: float, largest: Cause, cure: str) -> Sentence:
     return say(
         "uncertainty",
         "± {half} m, of which {part} m come from {cause}. {cure}",
         half=f"{half:.1f}",
         part=f"{part:.1f}",
         cause=_CAUSES[largest],
-        cure=_cure(largest, settings),
+        cure=cure,
     )
 
 

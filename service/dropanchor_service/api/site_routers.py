@@ -22,6 +22,7 @@ from dropanchor_service.api.routes.ingest import ingest_router
 from dropanchor_service.api.routes.ingest_health import ingest_health_router
 from dropanchor_service.api.routes.ingest_phyphox import ingest_phyphox_router
 from dropanchor_service.api.routes.ingest_stream import ingest_stream_router
+from dropanchor_service.api.routes.north import north_router
 from dropanchor_service.api.routes.plan_images import plan_images_router
 from dropanchor_service.api.routes.plans import plans_router
 from dropanchor_service.api.routes.poses import poses_router
@@ -83,6 +84,7 @@ def site_routers(site_of: SiteOfRequest, shared: SharedParts) -> tuple[APIRouter
         tags_router(site_of),
         tag_router(site_of),
         site_router(site_of),
+        north_router(site_of),
         remote_settings_router(site_of),
         track_router(site_of),
         track_file_router(site_of),

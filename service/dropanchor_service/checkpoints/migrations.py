@@ -46,7 +46,7 @@ def with_more_counters(found: Snapshot) -> Snapshot:
     return Snapshot({**found.arrays, "counts": after}, found.document)
 
 
-STEPS: Steps = {5: with_more_counters, 6: with_more_counters}
+STEPS: Steps = {6: with_more_counters}
 
 
 def migrated(found: Snapshot, version: int, dtypes: DTypes, fresh: Fresh, steps: Steps = STEPS) -> Snapshot:

@@ -45,6 +45,7 @@ TAG_SETTINGS = np.dtype(
         ("start_heading", "f8"),  # NaN: not given
         ("start_std", "f8"),
         ("declination", "f8"),  # true minus magnetic north, positive east
+        ("declination_std", "f8"),  # rad
         ("motion", "u1"),
         ("acc_factor", "f8"),  # by which the tag's accelerations become m/s²; engines get m/s², rad/s and m
         ("gyro_factor", "f8"),

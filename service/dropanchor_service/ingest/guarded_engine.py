@@ -7,40 +7,33 @@ from typing import NamedTuple
 import numpy as np
 
 from dropanchor_schemas.kinds import KINDS
-from dropanchor_schemas.site import TagSettings
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import (
-    POSE,
     TAG_SETTINGS,
     Array,
     Engine,
     PoseBatch,
     Restorable,
     SampleBatch,
-    State,
-    StateReason,
 )
 from dropanchor_service.estimation.plausibility.check import Checked, SensorCheck
 from dropanchor_service.estimation.plausibility.layout import make_checks
 from dropanchor_service.ingest.anchors import AnchorTable
+from dropanchor_service.ingest.configured import Configured
 from dropanchor_service.ingest.decode import Decoded
+from dropanchor_service.ingest.lost_pose import lost_pose
+from dropanchor_service.ingest.norths import NorthWatch
 from dropanchor_service.ingest.references import PressureReferences
 from dropanchor_service.ingest.starts import StartWatch
 from dropanchor_service.ingest.told_heights import ToldHeights
 from dropanchor_service.ingest.units import convert, has_units
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
-from dropanchor_service.settings.engine_columns import tag_columns
 from dropanchor_service.store import ServedSite, Sites
 from dropanchor_service.store.records import enlarged
 
 FAULTS_BEFORE_QUARANTINE = 3
 QUARANTINE_NS = 10_000_000_000
-
-
-class _Configured(NamedTuple):
-    tag: TagSettings
-    declination_rad: float
 
 
 class _Faults(NamedTuple):
@@ -60,13 +53,14 @@ class GuardedEngine:
         self._sites = sites
         self._metrics = metrics
         self.anchors = AnchorTable()
-        self._configured: dict[int, _Configured] = {}
+        self._configured: dict[int, Configured] = {}
         self._settings = np.zeros(0, TAG_SETTINGS)  # by row
         self._has_configured = np.zeros(0, bool)  # by row
         self._has_units = False  # whether any tag has other units than ours
         self._faults: dict[int, _Faults] = {}
         self._sensors = SensorCheck()
         self._starts = StartWatch(engine, sites.rows.start_news)
+        self._norths = NorthWatch(engine, sites.rows.norths)
         self._references = PressureReferences(engine)
         self._heights = ToldHeights()
 
@@ -100,10 +94,11 @@ class GuardedEngine:
         self._has_units = has_units(settings)
         for row, known in enumerate(settings):
             current = self._current(row)
-            unchanged = tag_columns(current.tag, current.declination_rad).tobytes() == known.tobytes()
+            unchanged = current.columns().tobytes() == known.tobytes()
             if unchanged and self._sites.of_row(row).index not in moved:
                 self._note(row, current)
                 self._starts.resume(row, current.tag)
+                self._norths.tell(row, current.tag)
                 self._references.resume(self._sites.of_row(row).index, row, current.tag)
         self._has_configured = np.zeros(len(settings), bool)
         self._has_configured[list(self._configured)] = True
@@ -136,10 +131,20 @@ class GuardedEngine:
             configured, current = self._configured.get(tag.row), self._current(tag.row)
             if configured is None:
                 continue
-            if restart or (configured != current and _differ(configured, current)):
+            if not restart and current.is_turned_from(configured):
+                self._turn(tag.row, current)
+            elif restart or current.matters_after(configured):
                 self._configure(tag.row)
             else:
                 self._note(tag.row, current)
+
+    def _turn(self, row: int, current: Configured) -> None:
+        """Follow another declination: a row that knows north by itself goes on, and no other returns to its start."""
+        if self._norths.turns(row, current.declination_rad):
+            self._note(row, current)
+            self._keep_settings(row, current.columns())
+        else:
+            self._configure(row, start_known=current.tag.start is None or not self._norths.has_left_start(row))
 
     def anchor_indices(self, rows: Array, numbers: Array) -> Array:
         """Return the engine's index for each anchor number that the tag of a row sent, -1 if its site lacks it."""
@@ -174,6 +179,7 @@ class GuardedEngine:
             self._starts.look(batch)
             self._sensors.mark(batch.poses)
             self._heights.mark(batch.poses)
+            self._norths.look(now_ns)
             for column in (batch.poses, batch.innovations):
                 column["anchor"] = self.anchors.own_indices(column["anchor"])
             yield batch
@@ -236,7 +242,7 @@ class GuardedEngine:
         self._faults[row] = _Faults(times, now_ns + QUARANTINE_NS if quarantine else 0)
         self._configure(row, start_known=False)
         t_ns = max(int(column["t_ns"].max()) for column in samples.columns() if len(column))
-        return PoseBatch(poses=_lost(row, t_ns))
+        return PoseBatch(poses=lost_pose(row, t_ns))
 
     def _configure(self, row: int, start_known: bool = True) -> None:
         current, before = self._current(row), self._configured.get(row)
@@ -249,16 +255,17 @@ class GuardedEngine:
             self._starts.end(row)
         # After a fault or a restart the tag is no longer where it started.
         tag = current.tag if start_known else current.tag.model_copy(update={"start": None})
-        self._engine.configure(row, tag_columns(tag, current.declination_rad))
+        self._norths.tell(row, tag)
+        self._engine.configure(row, current._replace(tag=tag).columns())
         if start_known:
             self._sensors.start(row, current.tag.acc_reversed is not None)
             self._sites.rows.findings.set(row, ())
-        self._keep_settings(row, tag_columns(current.tag, current.declination_rad))
+        self._keep_settings(row, current.columns())
         site = self._sites.of_row(row).index
         others = (other for other in self._configured if other != row and self._sites.of_row(other).index == site)
         self._references.follow(site, row, tag, others)
 
-    def _note(self, row: int, current: _Configured) -> None:
+    def _note(self, row: int, current: Configured) -> None:
         self._configured[row] = current
         self._heights.tell(row, current.tag)
 
@@ -269,26 +276,11 @@ class GuardedEngine:
         # Not over all rows: a storm of tags would take minutes.
         self._has_units = self._has_units or has_units(settings)
 
-    def _current(self, row: int) -> _Configured:
+    def _current(self, row: int) -> Configured:
         """Return the settings that its site has now for this row."""
         store = self._sites.of_row(row).store
-        return _Configured(store.tag_settings(self._sites.rows.at(row).name), store.site.declination_rad)
-
-
-def _differ(before: _Configured, now: _Configured) -> bool:
-    """Return whether the change matters to the engine. A name, a colour and a group do not."""
-    return tag_columns(*before).tobytes() != tag_columns(*now).tobytes()
-
-
-def _lost(row: int, t_ns: int) -> Array:
-    """Return POSE (1) of a row whose estimate is lost."""
-    pose = np.zeros(1, POSE)
-    for name in POSE.names or ():
-        if pose[name].dtype.kind == "f":
-            pose[name] = np.nan
-    pose["row"], pose["t_ns"], pose["anchor"] = row, t_ns, -1
-    pose["state"], pose["reason"] = State.LOST, StateReason.FAULT
-    return pose
+        tag, site = store.tag_settings(self._sites.rows.at(row).name), store.site
+        return Configured(tag, site.declination_rad, site.declination_std_rad)
 
 
 def _rows(samples: SampleBatch) -> Array:

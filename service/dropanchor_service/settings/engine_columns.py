@@ -18,8 +18,8 @@ def anchor_columns(anchors: Sequence[Anchor]) -> Array:
     return np.array([(anchor.x, anchor.y, anchor.z) for anchor in anchors], ANCHOR)
 
 
-def tag_columns(tag: TagSettings, declination_rad: float) -> Array:
-    """Return TAG_SETTINGS (0-d). Settings that are not given are NaN. declination_rad: of the site."""
+def tag_columns(tag: TagSettings, declination_rad: float, declination_std_rad: float | None = None) -> Array:
+    """Return TAG_SETTINGS (0-d). Settings that are not given are NaN. The declination and its error are the site's."""
     columns = default_settings()
     columns["height"] = tag.height_m
     columns["height_motion"] = HeightMotion[tag.height_motion.upper()]
@@ -36,7 +36,7 @@ def tag_columns(tag: TagSettings, declination_rad: float) -> Array:
     columns["heading_source"] = HeadingSource[tag.heading_source.upper()]
     columns["heading_std"] = _or_nan(tag.heading_std_rad)
     columns["magnetometer_calibrated"] = tag.magnetometer_calibrated
-    columns["declination"] = declination_rad
+    columns["declination"], columns["declination_std"] = declination_rad, declination_std_rad or 0.0
     columns["motion"] = Motion[tag.motion.upper()]
     columns["acc_factor"] = ACC_UNITS[tag.acc_unit] * (-1.0 if tag.acc_reversed else 1.0)
     columns["gyro_factor"], columns["range_factor"] = GYRO_UNITS[tag.gyro_unit], RANGE_UNITS[tag.range_unit]

@@ -12,6 +12,7 @@ from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.arrivals import Arrivals
 from dropanchor_service.store.findings import SensorFindings
+from dropanchor_service.store.norths import Norths
 from dropanchor_service.store.presence import OnlineUntil, Presence
 from dropanchor_service.store.recent import Recent
 from dropanchor_service.store.records import enlarged, take
@@ -102,6 +103,7 @@ class Rows:
         self._deleted: frozenset[int] = frozenset()
         self.arrivals = Arrivals()
         self.findings = SensorFindings()
+        self.norths = Norths()
         self.start_news = StartNewsQueue()
         self.wrong_times = WrongTimes()
         self.low_pressures: dict[int, float] = {}  # by row: the last one below what a barometer shows in Pa, as sent

@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from dropanchor_schemas.explain import Uncertainty
+from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_service.answers.uncertainty import uncertainty_of
 
@@ -43,6 +44,14 @@ def test_the_largest_part_is_named_with_something_that_the_settings_do_not_tell_
     assert answer.text.startswith("± 8.9 m, of which 8.0 m come from ")
     assert cure in answer.text
     assert answer.phrase.values["cause.code"] == f"uncertain.{cause}"
+
+
+@pytest.mark.parametrize(("cause", "named"), [("north", True), ("bearing", True), ("speed", False)])
+def test_what_other_tags_know_about_north_comes_before_what_a_person_could_tell(cause: str, named: bool) -> None:
+    offer = say("site_north", "{tags} tags know north. Apply that to all.", tags=2)
+    answer = Uncertainty.model_validate(uncertainty_of(pose_with(**{f"{cause}_m": 3.6}), TagSettings(), offer))
+    assert ("Apply that to all." in answer.text) == named
+    assert (answer.phrase.values["cure.code"] == "site_north") == named
 
 
 def test_an_engine_that_tells_no_parts_has_no_uncertainty_to_explain() -> None:

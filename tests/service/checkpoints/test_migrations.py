@@ -19,7 +19,7 @@ from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from support.golden_checkpoint import Drive, golden, halves
 
 EARLIER = f"{layouts.VERSION - 1}-{'0' * 16}"
-LAYOUT = "7-79ee0dd3b3097a7f"
+LAYOUT = "8-f47619404127814e"
 READ = range(layouts.VERSION - layouts.READ_BEFORE, layouts.VERSION)
 
 
@@ -70,9 +70,10 @@ def test_a_service_goes_on_from_each_layout_that_it_reads(version: int, uninterr
 
 
 def test_messages_stand_behind_the_kinds_of_whichever_number(tmp_path: Path) -> None:
-    before = decoded(golden(layouts.VERSION - 1))[1]
+    before = decoded(golden(READ[0]))[1]
     before.arrays["counts"]["screened"] = np.arange(5)
-    after = Drive(tmp_path).state.decoded(b"".join(encoded(before, EARLIER))).arrays["counts"]["screened"]
+    whole = b"".join(encoded(before, f"{READ[0]}-{'0' * 16}"))
+    after = Drive(tmp_path).state.decoded(whole).arrays["counts"]["screened"]
     assert after.tolist() == [[0, 1, 2, 3, 0, 4]] * 3
 
 

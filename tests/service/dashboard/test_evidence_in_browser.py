@@ -7,12 +7,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 
 from dropanchor_schemas.site import Anchor, Site
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, Array, State, StateReason
+from dropanchor_service.store.norths import North
 from service.dashboard.place import Place, live_api_bench
 from support.browser import Scheme, WatchedPage, watched_page
 from support.http_server import running_server
@@ -214,3 +215,26 @@ def test_an_engine_that_tells_no_parts_shows_none(chromium: Browser, place: Plac
         drive(place)
         select(page)
         assert page.page.locator("[data-part='uncertainty']").is_hidden()
+
+
+def test_north_that_others_know_is_applied_with_one_click_and_may_be_undone(chromium: Browser, place: Place) -> None:
+    tags, site = place.bench.answers.tags, place.bench.answers.site
+    for name in ("a", "b"):
+        tags.rows.norths.set(tags.register(name).row, North(-2.4, 0.1))
+    drive(place, parts=(0.2, 0.05, 0.0, 0.07, 0.04, 0.0))
+    tags.rows.count_samples("imu", np.array([tags.register("cart").row]))
+    with watched_page(chromium, place.url, reduced_motion="reduce") as watched:
+        select(watched)
+        box = watched.page.locator("[data-part='uncertainty']")
+        expect(box.locator("p")).to_contain_text(
+            "2 tags of this site that know where they started say that north is 138°"
+        )
+        box.get_by_role("button", name="Apply to all tags").click()
+        expect(watched.page.locator("#outcome")).to_contain_text("North of the site turned by 138°.")
+        assert site.site.declination_rad == pytest.approx(-2.4)
+        assert site.site.declination_std_rad == pytest.approx(0.12, abs=0.01)
+        expect(box.get_by_role("button", name="Apply to all tags")).to_be_hidden()
+        watched.page.keyboard.press("Control+z")
+        expect(watched.page.locator("#outcome")).to_contain_text("Undone")
+        assert site.site.declination_rad == 0.0
+        assert watched.errors == []

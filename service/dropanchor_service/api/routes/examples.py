@@ -72,6 +72,7 @@ EXPLANATION: dict[str, Any] = {
             },
         },
     },
+    "north": {"error_rad": -0.61, "std_rad": 0.11},
     "innovations": [
         {
             "t_ns": 1_800_000_000_000_000_000,
@@ -189,6 +190,7 @@ SITE: dict[str, Any] = {
     "id": "default",
     "name": "Yard",
     "declination_rad": 0.07,
+    "declination_std_rad": None,
     "georeference": {"lat": 52.5123, "lon": 13.4123, "rotation_rad": 0.0},
     "anchors": [ANCHOR],
 }

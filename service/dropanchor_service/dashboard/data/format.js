@@ -48,6 +48,9 @@ export function compass(rad) {
   return `${turned}° ${POINTS[Math.round(turned / 22.5) % 16]}`;
 }
 
+/** Format how far something is turned: degrees without a sign, by the shorter way. @param {number} rad */
+export const compassTurn = (rad) => `${Math.round(Math.abs(Math.atan2(Math.sin(rad), Math.cos(rad))) * (180 / Math.PI))}°`;
+
 /** Format a yaw rate as degrees per second to the left or to the right. @param {number | null | undefined} radps counter-clockwise */
 export function turnRate(radps) {
   if (!known(radps)) return UNKNOWN;

@@ -9,6 +9,7 @@ import { AMBIGUOUS } from "../data/states.js";
 import { clockText, healthTexts } from "./care.js";
 import { HeightPlot, heightsOfMinute } from "./height_plot.js";
 import { hintOf } from "./hint.js";
+import { applyNorth, isNorthOffered } from "./north.js";
 import { Plots } from "./plots.js";
 import { showUncertainty } from "./uncertainty.js";
 import { symbol } from "../map/symbols.js";
@@ -37,6 +38,7 @@ export class Detail {
     this.heights = new HeightPlot(this.#part("heights"));
     this.follow = /** @type {HTMLButtonElement} */ (this.#part("follow"));
     this.follow.addEventListener("click", () => (choice.follow = !choice.follow));
+    this.#part("apply-north").addEventListener("click", () => this.changes && applyNorth(this.changes));
     this.#part("close").addEventListener("click", () => this.leave());
     choice.addEventListener("change", () => this.update());
     evidence.addEventListener("change", () => this.#explain());
@@ -71,6 +73,7 @@ export class Detail {
     if (row < 0) return;
     this.plots.update(this.#explanation);
     showUncertainty(this.#part("uncertainty"), this.#explanation);
+    this.#part("apply-north").hidden = !(this.changes?.mayWrite && isNorthOffered(this.#explanation));
     const status = this.#explanation ?? this.roster.of(this.fleet.names[row]);
     countsInto(this.#part("samples"), t("tag.used"), status?.samples);
     countsInto(this.#part("rejected"), t("tag.rejected"), status?.rejected);

@@ -8,6 +8,7 @@ import numpy as np
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.belief.layout import ROW, SETTINGS
 from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
+from dropanchor_service.estimation.fleet.belief.start import REFERENCE_STD
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 RANGE_STD = 0.15  # m
@@ -15,7 +16,6 @@ HEIGHT_STD = 0.15  # m
 START_STD = 0.1  # m
 START_HEADING_STD = 0.05  # rad
 START_SPEED_STD = 0.3  # m/s
-REFERENCE_STD = 0.1  # rad, constant error of a heading reference
 SPEED_MAX = 10.0  # m/s
 MOUNT_UNKNOWN_STD = 0.5  # rad
 SLIP_KNOWN_STD, SLIP_UNKNOWN_STD = 0.05, 0.1  # rad, slip of what drives, sway of what is carried
@@ -41,7 +41,7 @@ def configure_row(columns: Array, tuning: Tuning) -> Array:
     settings["range_std"] = _positive(columns["range_std"], RANGE_STD)
     settings["range_bias_std"] = _given(columns["range_bias_std"], tuning.range_bias_std)
     settings["height_std"] = HEIGHT_STD
-    settings["reference_std"] = REFERENCE_STD
+    settings["reference_std"] = math.hypot(REFERENCE_STD, columns["declination_std"])
     settings["gyro_bias_std"] = GYRO_BIAS_STD
     settings["speed_max"] = _positive(columns["speed_max"], SPEED_MAX)
     for name in ("known", "x", "y", "heading"):

@@ -19,6 +19,7 @@ from dropanchor_service.estimation.fleet.frontend.ordering import Due, SampleQue
 from dropanchor_service.estimation.fleet.frontend.platform import PLATFORM
 from dropanchor_service.estimation.fleet.frontend.state import FRONTEND, start_frontend
 from dropanchor_service.estimation.fleet.lanes import Lanes
+from dropanchor_service.estimation.fleet.learned_north import have_own_north, learned_norths, turn_north
 from dropanchor_service.estimation.fleet.outputs import (
     Part,
     doubted_of,
@@ -46,7 +47,7 @@ class _Run(NamedTuple):
 
 
 class FleetEngine:
-    """Implement `Engine`, `Restorable`, `DeniesStarts` and `FollowsPressure`.
+    """Implement `Engine`, `Restorable`, `DeniesStarts`, `FollowsPressure` and `LearnsNorth`.
 
     A checkpoint copies the rows, the pool and the pending samples.
 
@@ -163,6 +164,17 @@ class FleetEngine:
         """Return whether each of the rows still follows the start in its settings: nothing has denied it."""
         at_start: Array = self._rows["start"]["known"][rows] == 1
         return at_start
+
+    def norths(self, rows: Array) -> Array:
+        """Return NORTH of those of the rows whose tracks tell it."""
+        return learned_norths(rows, self._rows, self._fronts, self._pool)
+
+    def turn_north(self, row: int, declination: float) -> bool:
+        """Use another declination, rad, in `row` if its own start tells it north. Return whether it does."""
+        own = bool(have_own_north(self._rows[row : row + 1])[0])
+        if own:
+            turn_north(self._rows[row], self._fronts[row], declination)
+        return own
 
     def state(self) -> dict[str, Array]:
         """Return the rows, the pool and the pending samples, without copying them."""

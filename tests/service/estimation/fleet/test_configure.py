@@ -8,10 +8,9 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.belief.births.heading_classes import may_have_own_error
 from dropanchor_service.estimation.fleet.belief.heading_models import SOFT_IRON_FACTOR, reference_error
 from dropanchor_service.estimation.fleet.belief.layout import MAGNETOMETER_MODEL, PLATFORM_MODEL
-from dropanchor_service.estimation.fleet.belief.start import choose_model
+from dropanchor_service.estimation.fleet.belief.start import REFERENCE_STD, choose_model
 from dropanchor_service.estimation.fleet.configure import (
     MOUNT_UNKNOWN_STD,
-    REFERENCE_STD,
     SLIP_KNOWN_STD,
     SLIP_UNKNOWN_STD,
     SPEED_MAX,
@@ -99,6 +98,24 @@ def test_with_the_imu_as_the_source_the_setting_is_the_error_of_north(given: flo
     assert may_start_with_own_error(rows[0]) == (given is None)
     assert rows["heading"]["north"][0] == pytest.approx(0.2 if given is None else 0.0)
     assert rows["settings"]["reference_std"][0] == (REFERENCE_STD if given is None else given)
+
+
+@pytest.mark.parametrize(
+    ("kind", "told", "std"),
+    [
+        (ABSOLUTE_HEADING, None, REFERENCE_STD),
+        (ABSOLUTE_HEADING, 0.24, 0.26),
+        (DERIVED_HEADING, 0.24, REFERENCE_STD),
+    ],
+)
+def test_the_error_of_the_sites_declination_is_one_of_magnetic_headings(
+    kind: int, told: float | None, std: float
+) -> None:
+    row = configure_row(tag_columns(TagSettings(), 0.5, told), Tuning()).reshape(1)
+    node = np.zeros(1, NODE)
+    node["heading_kind"] = kind
+    choose_model(row[0], node[0], Tuning())
+    assert row["settings"]["reference_std"][0] == pytest.approx(std)
 
 
 @pytest.mark.parametrize(("heading", "times"), [(0.5, SOFT_IRON_FACTOR), (None, 1.0)])

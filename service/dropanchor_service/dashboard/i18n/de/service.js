@@ -100,6 +100,8 @@ export default {
   "say.uncertain.bearing": "die Richtung, in der es gestartet ist",
   "say.uncertain.ranges": "seine Distanzen",
   "say.uncertain.height": "seine Höhe",
+  "say.site_north": "{tags} Tags dieses Standorts, die wissen, wo sie gestartet sind, zeigen: Nord liegt um {error}° ± {within}° daneben. Übernehmen Sie das für alle.",
+  "say.site_north_of_one": "Ein Tag dieses Standorts, das weiß, wo es gestartet ist, zeigt: Nord liegt um {error}° ± {within}° daneben. Übernehmen Sie das für alle.",
   "say.cure.start": "Legen Sie fest, wo es startet und wohin es dabei zeigt (`start`).",
   "say.cure.anchor": "Ein zweiter Anker würde es zeigen.",
   "say.cure.north": "Legen Sie fest, wie weit Nord an seinem Ort falsch sein kann (`heading_std_rad`).",

@@ -55,6 +55,8 @@ export default {
   "figure.accuracy": "Genauigkeit (95 %)",
   "figure.accuracy_title": "Wie weit die Ellipse auf der Karte, in der das Tag mit 95 % Wahrscheinlichkeit ist, vom Punkt aus reicht",
   "figure.along_across": "± {along} längs, ± {across} quer",
+  "north.apply": "Für alle Tags übernehmen",
+  "north.applied": "Nord des Standorts um {turn} gedreht.",
   "part.title": "Woher die Unsicherheit kommt",
   "part.north_m": "Nord",
   "part.mount_m": "Einbau",

@@ -100,6 +100,8 @@ export default {
   "say.uncertain.bearing": "the direction in which it started",
   "say.uncertain.ranges": "its ranges",
   "say.uncertain.height": "its height",
+  "say.site_north": "{tags} tags of this site that know where they started say that north is {error}° ± {within}° off. Apply that to all.",
+  "say.site_north_of_one": "A tag of this site that knows where it started says that north is {error}° ± {within}° off. Apply that to all.",
   "say.cure.start": "Set where it starts and looks (`start`).",
   "say.cure.anchor": "A second anchor would tell.",
   "say.cure.north": "Set how far north may be off where it is (`heading_std_rad`).",

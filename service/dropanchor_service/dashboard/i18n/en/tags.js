@@ -55,6 +55,8 @@ export default {
   "figure.accuracy": "Accuracy (95 %)",
   "figure.accuracy_title": "How far the ellipse on the map, which holds the tag with 95 % probability, reaches from the dot",
   "figure.along_across": "± {along} along, ± {across} across",
+  "north.apply": "Apply to all tags",
+  "north.applied": "North of the site turned by {turn}.",
   "part.title": "What the uncertainty comes from",
   "part.north_m": "North",
   "part.mount_m": "Mounting",

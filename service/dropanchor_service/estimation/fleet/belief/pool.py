@@ -56,7 +56,7 @@ def of_lanes(pool: Pool, rows: Rows, lanes: int) -> Pool:
 
 def packed(pool: Pool, rows: Rows, slots: int, lanes: int = 1) -> Pool:
     """Return another pool with the same hypotheses: those of each row one behind the other, which is fast to read."""
-    at = _slots_of(rows, pool)
+    at = slots_of(rows, pool)
     used = len(at)
     moved = np.zeros(lanes + used + slots * lanes + used // 4, POOL_SLOT)
     raw = np.dtype((np.void, POOL_SLOT.itemsize))  # NumPy copies records field by field
@@ -70,7 +70,7 @@ def packed(pool: Pool, rows: Rows, slots: int, lanes: int = 1) -> Pool:
     return moved
 
 
-def _slots_of(rows: Rows, pool: Pool) -> npt.NDArray[np.int64]:
+def slots_of(rows: Rows, pool: Pool) -> npt.NDArray[np.int64]:
     """Return the slots of all hypotheses, row after row, in the order in which they are stored."""
     counts = rows["count"].astype(np.int64)
     slots = np.empty(counts.sum(), np.int64)

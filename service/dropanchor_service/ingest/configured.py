@@ -1,0 +1,27 @@
+"""What a row of the engine was made with."""
+
+from typing import NamedTuple
+
+from dropanchor_schemas.site import TagSettings
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.settings.engine_columns import tag_columns
+
+
+class Configured(NamedTuple):
+    """The settings of a tag and of its site."""
+
+    tag: TagSettings
+    declination_rad: float
+    declination_std_rad: float | None
+
+    def columns(self) -> Array:
+        """Return TAG_SETTINGS (0-d)."""
+        return tag_columns(*self)
+
+    def matters_after(self, before: "Configured") -> bool:
+        """Return whether the change from `before` matters to the engine. A name, a colour and a group do not."""
+        return self != before and self.columns().tobytes() != before.columns().tobytes()
+
+    def is_turned_from(self, before: "Configured") -> bool:
+        """Return whether the declination and its error are all that matters in the change from `before`."""
+        return self[1:] != before[1:] and not self.matters_after(self._replace(tag=before.tag))
