@@ -26,14 +26,19 @@ Steps = Mapping[int, Callable[[Snapshot], Snapshot]]
 SETTINGS = "engine.settings"
 
 
+def _names(found: Snapshot, array: str) -> tuple[str, ...]:
+    """Return the columns of an array of a snapshot, none if it is not there."""
+    return (found.arrays[array].dtype.names or ()) if array in found.arrays else ()
+
+
 def with_more_counters(found: Snapshot) -> Snapshot:
     """Return a snapshot whose counters have room for the kinds of samples and the reasons that a layout appended.
 
     In `screened` the messages stand behind the kinds.
     """
-    before = found.arrays.get("counts")
-    if before is None or "rejected" not in (before.dtype.names or ()):
+    if "rejected" not in _names(found, "counts"):
         return found
+    before = found.arrays["counts"]
     after = np.zeros(len(before), COUNTS)
     for name in before.dtype.names or ():
         if before[name].ndim == 1:
@@ -46,7 +51,23 @@ def with_more_counters(found: Snapshot) -> Snapshot:
     return Snapshot({**found.arrays, "counts": after}, found.document)
 
 
-STEPS: Steps = {6: with_more_counters}
+HEADING_MODELS = np.array([0, 0, 0, 0, 2, 3], np.uint8)  # by the number of before: those of a reading start anew
+DRIFTING = 2  # class of hypotheses whose gyroscope drifts, which is gone
+
+
+def with_two_heading_models(found: Snapshot) -> Snapshot:
+    """Return a snapshot with the present numbers of the models of a heading's error, and of the classes."""
+    arrays = {**found.arrays}
+    if "heading" in _names(found, "engine.rows"):
+        rows = arrays["engine.rows"] = found.arrays["engine.rows"].copy()
+        rows["heading"]["model"] = HEADING_MODELS[rows["heading"]["model"]]
+    if "heading_class" in _names(found, "engine.pool"):
+        pool = arrays["engine.pool"] = found.arrays["engine.pool"].copy()
+        pool["heading_class"][pool["heading_class"] == DRIFTING] = 0
+    return Snapshot(arrays, found.document)
+
+
+STEPS: Steps = {6: with_more_counters, 7: with_two_heading_models}
 
 
 def migrated(found: Snapshot, version: int, dtypes: DTypes, fresh: Fresh, steps: Steps = STEPS) -> Snapshot:

@@ -19,7 +19,7 @@ from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from support.golden_checkpoint import Drive, golden, halves
 
 EARLIER = f"{layouts.VERSION - 1}-{'0' * 16}"
-LAYOUT = "8-f47619404127814e"
+LAYOUT = "8-a15196d1ea678c0a"
 READ = range(layouts.VERSION - layouts.READ_BEFORE, layouts.VERSION)
 
 
@@ -77,6 +77,15 @@ def test_messages_stand_behind_the_kinds_of_whichever_number(tmp_path: Path) -> 
     assert after.tolist() == [[0, 1, 2, 3, 0, 4]] * 3
 
 
+def test_models_of_a_heading_keep_their_meaning_and_a_drifting_gyroscope_has_no_class_any_more() -> None:
+    before = decoded(golden(6))[1]
+    rows, pool = before.arrays["engine.rows"], before.arrays["engine.pool"]
+    rows["heading"]["model"], pool["heading_class"][:3] = [3, 4, 5], [0, 1, 2]
+    after = STEPS[7](before).arrays
+    assert after["engine.rows"]["heading"]["model"].tolist() == [0, 2, 3]
+    assert after["engine.pool"]["heading_class"][:3].tolist() == [0, 1, 0]
+
+
 def earlier(present: Snapshot) -> Snapshot:
     """Return a snapshot as a version could have written it that had other columns, in another order."""
     arrays = dict(present.arrays)
@@ -105,7 +114,7 @@ def test_equal_columns_are_copied_new_ones_are_those_of_a_fresh_tag_and_dropped_
     for name in ("settings", "first_slot", "count", "publication", "t_ns", "lever_rate"):
         assert rows[name].tobytes() == before[name].tobytes()
     assert rows["quiet_share"].tolist() == [QUIET_START] * 3
-    assert not rows["heading"]["bank_started"].any()
+    assert not rows["heading"]["models_started"].any()
     pool, slots = found.arrays["engine.pool"], present.arrays["engine.pool"]
     assert (pool["cov"] == slots["cov"]).all()
     assert not pool["aligned"].any()

@@ -9,6 +9,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.belief.layout import ROW, SETTINGS
 from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from dropanchor_service.estimation.fleet.belief.start import REFERENCE_STD
+from dropanchor_service.estimation.fleet.frontend.inertial import BIAS_LEFT
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 RANGE_STD = 0.15  # m
@@ -20,7 +21,6 @@ SPEED_MAX = 10.0  # m/s
 MOUNT_UNKNOWN_STD = 0.5  # rad
 SLIP_KNOWN_STD, SLIP_UNKNOWN_STD = 0.05, 0.1  # rad, slip of what drives, sway of what is carried
 SLIP_KNOWN_TAU, SLIP_UNKNOWN_TAU = 1.0, 3.0  # s
-GYRO_BIAS_STD = 0.001  # rad/s, least bias of the gyroscope that the front-end leaves
 
 
 def configure_row(columns: Array, tuning: Tuning) -> Array:
@@ -42,7 +42,7 @@ def configure_row(columns: Array, tuning: Tuning) -> Array:
     settings["range_bias_std"] = _given(columns["range_bias_std"], tuning.range_bias_std)
     settings["height_std"] = HEIGHT_STD
     settings["reference_std"] = math.hypot(REFERENCE_STD, columns["declination_std"])
-    settings["gyro_bias_std"] = GYRO_BIAS_STD
+    settings["gyro_bias_std"] = BIAS_LEFT
     settings["speed_max"] = _positive(columns["speed_max"], SPEED_MAX)
     for name in ("known", "x", "y", "heading"):
         start[name] = columns[f"start_{name}"]

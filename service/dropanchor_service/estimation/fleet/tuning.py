@@ -29,10 +29,8 @@ class Tuning(NamedTuple):
     mount_cells: int = 10  # guesses on each side: all around
     mount_straight: float = 0.5  # share of tags that point about ahead
     mount_any: float = 0.2  # share of tags that may point anywhere
-    gyro_bias_std: float = 0.02  # rad/s, residual bias
     drift_std: float = 0.006  # rad/s, of a platform's heading that drifts
     q_gyro: float = 1e-7  # (rad/s)^2/s, of a tag whose platform measures its heading beside it
-    q_gyro_drift: float = 1e-4  # the same, of one that drifts
     class_rejected_weight: float = 1e-3  # weight below which a heading class no longer counts for the ellipse
     q_gyro_own: float = 1e-6  # the same, of all others
     acc_bias_std: float = 0.11  # m/s^2

@@ -75,7 +75,7 @@ RULES: Final = (
     Rule("bias of ranges returns", "*/recorded/*/known", {"range_bias_tau": 1e9}),
     Rule("largest detour of a range", "*/*/nothing/unknown", {"nlos_max_bias": math.inf}),
     Rule(
-        "bank of heading models",
+        "a heading's error that wanders",
         "*/scalar/nothing/*",
         constants={"belief.heading_models:SWITCH_LOG_RATIO": math.inf},
     ),

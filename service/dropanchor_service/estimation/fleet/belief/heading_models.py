@@ -1,8 +1,8 @@
-"""How wrong the heading reference is: a small bank of models of its error, chosen by their predictions.
+"""How wrong the heading reference is: two models of its error, chosen by their predictions.
 
 Each model m is a Kalman filter over (yaw, gyroscope bias, slow error) with the node's yaw increment and heading. The
-models differ in how much of the claimed variance is white and how much is a Gauss-Markov error. White errors average
-out; an error that wanders for seconds does not.
+first takes the claimed variance to be white, the second the error to wander for seconds, which does not average out.
+The bias may change quickly here: where a gyroscope drifts, the heading is not to blame.
 
     predict   yaw += dyaw - b dt,   slow *= exp(-dt/tau)          update   heading = yaw + slow + white
 """
@@ -12,10 +12,8 @@ import math
 from dropanchor_service.estimation.columns import HeadingSource
 from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.belief.layout import (
-    BANK,
-    DRIFT_MODEL,
-    DRIFTING,
     MAGNETOMETER_MODEL,
+    MODELS,
     OWN_ERROR,
     PLATFORM_MODEL,
     Floats,
@@ -23,11 +21,12 @@ from dropanchor_service.estimation.fleet.belief.layout import (
 )
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import RESTING, Node
+from dropanchor_service.estimation.fleet.frontend.standstill import BIAS_SD
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 SOFT_IRON_FACTOR = 3.0  # times the claimed error of a magnetometer
-SWITCH_LOG_RATIO = 3.0  # log likelihood by which another model must win
-LATER_LOG_PRIOR = -2.0  # of all models but the first
+SWITCH_LOG_RATIO = 10.0  # log likelihood by which another model must win
+BIAS_WALK = 1e-5  # (rad/s)^2/s, of the gyroscope's bias in these models
 MAX_SQUARED_ERROR = 25.0  # in variances: one reading must not decide between models
 SLOW_TAU = 60.0  # s, of an error of the reference that is given, of a platform's, or of a class of its own
 FROM_IMU = int(HeadingSource.IMU)
@@ -35,20 +34,13 @@ FROM_IMU = int(HeadingSource.IMU)
 
 @njit(nogil=True)
 def model_parameters(m: int, variance: float) -> tuple[float, float, float]:
-    """Return (white variance rad^2, sd of the slow error rad, its time constant s) of model m for a claimed variance.
-
-    Of the bank, model 0 is white, 1 and 3 are almost all slow, and DRIFT_MODEL is half of each.
-    """
+    """Return (white variance rad^2, sd of the slow error rad, its time constant s) of model m."""
     if m == MAGNETOMETER_MODEL:
         return 0.01 * variance + 1e-5, math.sqrt(variance), 30.0
     if m == PLATFORM_MODEL:
         return 4e-4, 0.03, SLOW_TAU
     if m == 1:
         return 0.01 * variance, 0.1, 3.0
-    if m == DRIFT_MODEL:
-        return variance, 0.15, 20.0
-    if m == 3:
-        return 0.01 * variance, 0.15, 15.0
     return variance, 0.0, 20.0
 
 
@@ -76,8 +68,6 @@ def reference_error(row: Row, variance: float) -> tuple[float, float, float]:
 @njit(nogil=True)
 def class_reference_error(row: Row, heading_class: int, variance: float, t: Tuning) -> tuple[float, float, float]:
     """Return `reference_error` of one class of hypotheses."""
-    if heading_class == DRIFTING:
-        return model_parameters(0, variance)
     white, slow, tau = reference_error(row, variance)
     if heading_class == OWN_ERROR and row.heading.model != PLATFORM_MODEL:
         return white, math.sqrt(slow * slow + t.own_error_std**2), SLOW_TAU
@@ -99,30 +89,30 @@ def is_north_given(row: Row) -> bool:
 
 
 @njit(nogil=True)
-def reset_models(row: Row, heading: float, variance: float, t: Tuning) -> None:
-    """Start every model of the bank at this heading, rad."""
-    for m in range(BANK):
+def reset_models(row: Row, heading: float, variance: float) -> None:
+    """Start both models at this heading, rad."""
+    for m in range(MODELS):
         white, slow, _ = model_parameters(m, variance)
-        row.heading.bank_mean[m, 0], row.heading.bank_mean[m, 1], row.heading.bank_mean[m, 2] = heading, 0.0, 0.0
+        row.heading.model_mean[m, 0], row.heading.model_mean[m, 1], row.heading.model_mean[m, 2] = heading, 0.0, 0.0
         for i in range(3):
             for j in range(3):
-                row.heading.bank_cov[m, i, j] = 0.0
-        row.heading.bank_cov[m, 0, 0] = white + slow * slow
-        row.heading.bank_cov[m, 1, 1] = t.gyro_bias_std**2
-        row.heading.bank_cov[m, 2, 2] = slow * slow
-        row.heading.bank_cov[m, 0, 2] = row.heading.bank_cov[m, 2, 0] = -slow * slow
-        row.heading.bank_log_likelihood[m] = 0.0 if m == 0 else LATER_LOG_PRIOR
-    row.heading.bank_started = 1
+                row.heading.model_cov[m, i, j] = 0.0
+        row.heading.model_cov[m, 0, 0] = white + slow * slow
+        row.heading.model_cov[m, 1, 1] = BIAS_SD**2
+        row.heading.model_cov[m, 2, 2] = slow * slow
+        row.heading.model_cov[m, 0, 2] = row.heading.model_cov[m, 2, 0] = -slow * slow
+        row.heading.model_log_likelihood[m] = 0.0
+    row.heading.models_started = 1
     row.heading.model = 0
 
 
 @njit(nogil=True)
 def predict_models(row: Row, node: Node, variance: float, t: Tuning) -> None:
-    """Predict every model over the node. At rest the increment measures the gyroscope's bias."""
+    """Predict both models over the node. At rest the increment measures the gyroscope's bias."""
     dt = node.dt_s
-    for m in range(BANK):
+    for m in range(MODELS):
         _, slow, tau = model_parameters(m, variance)
-        s, P = row.heading.bank_mean[m], row.heading.bank_cov[m]
+        s, P = row.heading.model_mean[m], row.heading.model_cov[m]
         if node.rest == RESTING and dt > 0.0:
             _update_component(s, P, 1, node.dyaw / dt - s[1], node.dyaw_var / dt**2 + t.rest_gyro_std**2)
         decay = math.exp(-dt / tau)
@@ -133,7 +123,7 @@ def predict_models(row: Row, node: Node, variance: float, t: Tuning) -> None:
         P[0, 2] = (P[0, 2] - dt * P[1, 2]) * decay
         P[1, 2] *= decay
         P[2, 2] = P[2, 2] * decay * decay + slow * slow * (1.0 - decay * decay)
-        P[1, 1] += t.q_gyro * dt
+        P[1, 1] += BIAS_WALK * dt
         P[1, 0], P[2, 0], P[2, 1] = P[0, 1], P[0, 2], P[1, 2]
 
 
@@ -160,13 +150,13 @@ def _apply_gain(s: Floats, P: Floats, k0: float, k1: float, k2: float, e: float,
 
 @njit(nogil=True)
 def update_models(row: Row, node: Node, t: Tuning) -> int:
-    """Update every model with the node's heading. Return the model to use, with hysteresis."""
+    """Update both models with the node's heading. Return the model to use, with hysteresis."""
     forget = math.exp(-node.dt_s / t.model_forget)
-    log_likelihood = row.heading.bank_log_likelihood
+    log_likelihood = row.heading.model_log_likelihood
     best = 0
-    for m in range(BANK):
+    for m in range(MODELS):
         white, _, _ = model_parameters(m, node.heading_var)
-        s, P = row.heading.bank_mean[m], row.heading.bank_cov[m]
+        s, P = row.heading.model_mean[m], row.heading.model_cov[m]
         e = wrap(node.heading - s[0] - s[2])
         p0, p1, p2 = P[0, 0] + P[0, 2], P[1, 0] + P[1, 2], P[2, 0] + P[2, 2]
         S = p0 + p2 + white

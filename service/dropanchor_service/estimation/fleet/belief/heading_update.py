@@ -3,7 +3,6 @@
 import math
 
 from dropanchor_service.estimation.fleet.angles import wrap
-from dropanchor_service.estimation.fleet.belief.births.moments import at_new_heading_model
 from dropanchor_service.estimation.fleet.belief.heading_models import (
     class_reference_error,
     is_heading_std_given,
@@ -21,7 +20,6 @@ from dropanchor_service.estimation.fleet.belief.heading_reference import (
     turn_to_yaw,
 )
 from dropanchor_service.estimation.fleet.belief.layout import (
-    DRIFTING,
     EXACT,
     MAGNETOMETER_MODEL,
     PHI,
@@ -40,19 +38,19 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 
 
 @njit(nogil=True)
-def update_with_heading(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> int:
-    """Update the hypotheses with the node's heading. Return their count, which a change of model may raise."""
+def update_with_heading(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> None:
+    """Update the hypotheses with the node's heading."""
     if row.heading.in_site_frame == 0 and not _enter_site_frame(work, count, row, node, t):
-        return count
+        return
     if node.heading_kind == MEASURED_HEADING:
         if not is_heading_std_given(row):
-            count = _update_heading_model(work, count, row, node, t, scratch)
+            _update_heading_model(work, count, row, node, t)
     elif (
         node.heading_kind == ABSOLUTE_HEADING
         and row.heading.model != MAGNETOMETER_MODEL
         and not _adopt_magnetic_heading(work, count, row, node)
     ):
-        return count
+        return
     for h in range(count):
         if row.heading.model != PLATFORM_MODEL or work[h].heading_class == EXACT:
             white, _, _ = class_reference_error(row, work[h].heading_class, node.heading_var, t)
@@ -60,32 +58,25 @@ def update_with_heading(work: Hypotheses, count: int, row: Row, node: Node, t: T
     if row.heading.model == MAGNETOMETER_MODEL:
         _, slow, _ = reference_error(row, node.heading_var)
         row.heading.slow_var = slow * slow
-    return count
 
 
 @njit(nogil=True)
-def _update_heading_model(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> int:
-    """Choose the model of the heading error by the bank's predictions. A new model's slow error goes to all hypotheses.
-
-    Return the count of hypotheses.
-    """
+def _update_heading_model(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> None:
+    """Choose the model of the heading error by the predictions of both. Its slow error goes to all hypotheses."""
     heading = row.heading
-    if heading.bank_started == 0:
-        reset_models(row, node.heading, node.heading_var, t)
-        return count
+    if heading.models_started == 0:
+        reset_models(row, node.heading, node.heading_var)
+        return
     predict_models(row, node, node.heading_var, t)
     chosen = update_models(row, node, t)
     if chosen == heading.model:
-        return count
+        return
     _, before, _ = model_parameters(heading.model, node.heading_var)
     _, after, _ = model_parameters(chosen, node.heading_var)
     heading.model = chosen
-    count = at_new_heading_model(work, count, row, node, t, scratch)
     if after > before:
         for h in range(count):
-            if work[h].heading_class != DRIFTING:
-                add_reference_error(work[h].cov, math.sqrt(after * after - before * before), False)
-    return count
+            add_reference_error(work[h].cov, math.sqrt(after * after - before * before), False)
 
 
 @njit(nogil=True)

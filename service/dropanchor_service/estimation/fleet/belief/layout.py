@@ -32,17 +32,15 @@ START_RANGES: Final = 15  # of which the median gives the distance of an unknown
 NOISE_LEVELS: Final = 6  # of errors of ranges that last
 STUCK_SLOTS: Final = 4  # anchors of a row whose last ranges are kept; those of equal remainder share a slot
 
-# Models of the error of the heading reference (`heading_models`). The first BANK are judged by their predictions.
-BANK: Final = 4
-DRIFT_MODEL: Final = 2  # of the bank: heading and gyroscope drift apart, slowly
-MAGNETOMETER_MODEL: Final = 4  # given by the kind of heading: almost all of the variance is one slow error
-PLATFORM_MODEL: Final = 5  # given by the kind of heading: a platform's own, which is stable or drifts
+# Models of the error of the heading reference (`heading_models`). The first MODELS are judged by their predictions.
+MODELS: Final = 2  # an error that is white, and one that wanders for seconds
+MAGNETOMETER_MODEL: Final = 2  # given by the kind of heading: almost all of the variance is one slow error
+PLATFORM_MODEL: Final = 3  # given by the kind of heading: a platform's own, which is stable or drifts
 
 # Classes of hypotheses: what is wrong with the heading.
 EXACT: Final = 0  # no more than the heading model says
 OWN_ERROR: Final = 1  # the heading reference has a slow error of its own, or drifts
-DRIFTING: Final = 2  # the gyroscope drifts and the heading does not
-CLASSES: Final = 3
+CLASSES: Final = 2
 FAMILIES: Final = 3 * CLASSES  # each of them: a body axis along the course, any, and one quite unlike the best guess
 
 SETTINGS: Final = np.dtype(
@@ -95,10 +93,10 @@ HEADING: Final = np.dtype(
         ("north", np.float64),  # rad, constant error of the reference, learned from a given start heading
         ("slow_var", np.float64),  # rad^2, of the slow error of a magnetometer at the node before; 0: none
         ("in_site_frame", np.uint8),  # 1: yaw counts from east; 0: the x axis is the first direction of travel
-        ("bank_started", np.uint8),
-        ("bank_mean", np.float64, (BANK, 3)),  # yaw rad, gyroscope bias rad/s, slow error rad
-        ("bank_cov", np.float64, (BANK, 3, 3)),
-        ("bank_log_likelihood", np.float64, (BANK,)),
+        ("models_started", np.uint8),
+        ("model_mean", np.float64, (MODELS, 3)),  # yaw rad, gyroscope bias rad/s, slow error rad
+        ("model_cov", np.float64, (MODELS, 3, 3)),
+        ("model_log_likelihood", np.float64, (MODELS,)),
     ]
 )
 
@@ -221,7 +219,7 @@ ROW: Final = np.dtype(
 POOL_SLOT: Final = np.dtype(
     [
         ("next", np.int32),
-        ("heading_class", np.int32),  # EXACT, OWN_ERROR or DRIFTING
+        ("heading_class", np.int32),  # EXACT or OWN_ERROR
         ("nlos", np.int32),  # 1: there is no line of sight now, so ranges are too long
         ("reverse", np.int32),  # 1: the tag moves backwards since it last stood
         ("aligned", np.int32),  # 1: the body axis is taken to point along the course

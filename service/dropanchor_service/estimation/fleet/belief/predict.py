@@ -18,7 +18,6 @@ from dropanchor_service.estimation.fleet.belief.heading_models import class_refe
 from dropanchor_service.estimation.fleet.belief.heading_reference import follow_reference
 from dropanchor_service.estimation.fleet.belief.layout import (
     ACC_BIAS,
-    DRIFTING,
     GYRO_BIAS,
     LEFT_BIAS,
     MAGNETOMETER_MODEL,
@@ -221,9 +220,7 @@ def fill_noise(decay: Floats, growth: Floats, node: Node, row: Row, t: Tuning) -
 def fill_class_noise(decay: Floats, growth: Floats, node: Node, row: Row, heading_class: int, t: Tuning) -> None:
     """Fill what differs between heading classes: the drifts of the gyroscope and of the reference."""
     beside = node.heading_kind == MEASURED_HEADING or node.heading_kind == NO_HEADING
-    growth[GYRO_BIAS] = (
-        t.q_gyro_own if not beside else t.q_gyro_drift if heading_class == DRIFTING else t.q_gyro
-    ) * node.dt_s
+    growth[GYRO_BIAS] = (t.q_gyro if beside else t.q_gyro_own) * node.dt_s
     if row.heading.model == MAGNETOMETER_MODEL and node.heading_kind != ABSOLUTE_HEADING:
         decay[REFERENCE], growth[REFERENCE] = 1.0, 0.0
         return

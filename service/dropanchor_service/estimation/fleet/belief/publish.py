@@ -3,6 +3,7 @@
 import math
 from typing import Final
 
+from dropanchor_service.estimation.fleet.belief.births.sight import MISFIT_LIMIT
 from dropanchor_service.estimation.fleet.belief.layout import Anchors, Belief, Floats, Hypotheses, Row, Scratch
 from dropanchor_service.estimation.fleet.belief.observability import predict_information, sigma_obs
 from dropanchor_service.estimation.fleet.belief.parts import fill_parts
@@ -39,7 +40,6 @@ COASTING_AFTER, RANGES_LOST_AFTER = 1.5, 30.0  # s without a range
 IMU_DEGRADED_AFTER, IMU_LOST_AFTER = 0.5, 10.0  # s that no sensor observed
 SMALL_M, SMALL_SHARE = 1.5, 0.1  # a mode is small below 1.5 m or 10 % of the distance
 LARGE_M, LARGE_SHARE = 3.0, 0.35  # an ellipse is too large for use above 3 m or 35 % of the distance
-MISFIT_LIMIT: Final = 0.5  # mean outlier probability above which the ranges are said to be rejected
 
 
 @njit(nogil=True)

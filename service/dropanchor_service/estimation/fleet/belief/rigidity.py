@@ -36,8 +36,7 @@ JOLTS_CLIP: Final = 25.0  # limit of what one innovation counts
 ASKEW_MISFIT: Final = 1.5  # mean square of it above which another mounting angle makes the tag ambiguous
 ASKEW_SHARE: Final = 0.5  # share of it that another mounting angle explains at least, if it is that and no jolts
 TELLING: Final = 2.0  # ratio of the two variances from which on an innovation tells between the classes
-LEAST: Final = -10.0  # log likelihood ratio of one node: a skid is no loose mount
-LOG_ODDS_LIMIT: Final = 10.0  # so that a mount that comes loose is noticed
+LOG_ODDS_LIMIT: Final = 10.0  # so that a mount that comes loose is noticed, and one skid is no loose mount
 RIGID_ABOVE: Final = 3.0  # log odds at which a mount becomes rigid
 LOOSE_BELOW: Final = 0.0  # and at which it is loose again
 
@@ -99,7 +98,7 @@ def judge_mount(one: Hypothesis, scratch: Scratch, node: Node, row: Row) -> None
     loose = S + (settings.slip_std**2 - RIGID_SLIP**2) * s[V] * s[V] * 2.0 * node.dt_s / settings.slip_tau
     if loose > TELLING * S:
         ratio = 0.5 * (math.log(loose / S) - e * e * (1.0 / S - 1.0 / loose))
-        log_odds = mount.rigid_log_odds + POWER * max(ratio, LEAST)
+        log_odds = mount.rigid_log_odds + POWER * max(ratio, -LOG_ODDS_LIMIT)
         mount.rigid_log_odds = min(max(log_odds, -LOG_ODDS_LIMIT), LOG_ODDS_LIMIT)
 
 

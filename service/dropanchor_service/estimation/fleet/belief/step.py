@@ -93,17 +93,16 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
 
 
 @njit(nogil=True)
-def _fuse_motion(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> int:
-    """Fuse the node's heading, rest and steps. Return the count of hypotheses."""
+def _fuse_motion(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> None:
+    """Fuse the node's heading, rest and steps."""
     if is_in_site_frame(node.heading_kind):
-        count = update_with_heading(work, count, row, node, t, scratch)
+        update_with_heading(work, count, row, node, t, scratch)
     if node.rest != MOVING:
         for h in range(count):
             work[h].log_weight += update_standstill(work[h].mean, work[h].cov, scratch.PH, node, t)
     if node.carried == 1:
         for h in range(count):
             update_steps(work[h], scratch, node, t)
-    return count
 
 
 @njit(nogil=True)
@@ -152,7 +151,7 @@ def _run_node(
     """Take a node into a row that has hypotheses. Return their count, 0 where the numbers are not finite."""
     count = before_prediction(work, count, row, node, t, scratch)
     _predict_all(work, count, row, node, t, scratch)
-    count = _fuse_motion(work, count, row, node, t, scratch)
+    _fuse_motion(work, count, row, node, t, scratch)
     count = after_prediction(work, count, row, node, t, scratch)
     belief.stuck = is_stuck(row, node, work[best_of(work, count)].mean[V])
     count = _fuse_measurement(work, count, row, node, anchors, t, scratch, belief)

@@ -18,6 +18,7 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.preintegration import GYRO_SCALE
 
 N = 8
 BIAS, SCALE = 6, 7
@@ -49,7 +50,6 @@ FIELD_WALK = 0.013  # of r, per sqrt(s)
 IRON_WALK = 0.02  # of r, per sqrt(s): motors near by
 YAW_WALK = 1e-6  # rad^2/s, the gyroscope's white noise
 BIAS_SD = 1.5e-3  # rad/s, of what rest has left
-SCALE_SD = 7e-3  # of the turn, error of the gyroscope's scale
 BIAS_WALK = 1e-10  # (rad/s)^2/s
 
 
@@ -65,7 +65,7 @@ def start_magnetometer(g: Magnetometer, mx: float, my: float, mz: float, hard_ir
         g.P[3 + i, 3 + i] = hard_iron * hard_iron * u2
         g.noise[i] = NOISE * NOISE * u2
     g.P[BIAS, BIAS] = BIAS_SD * BIAS_SD + bias_var
-    g.P[SCALE, SCALE] = SCALE_SD * SCALE_SD
+    g.P[SCALE, SCALE] = GYRO_SCALE * GYRO_SCALE
     g.age = NOISE_PRIOR
     g.changed = 0
     g.since_last = 0.0

@@ -15,6 +15,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.gait import TAU_LOW
 
 STRIDE: Final = np.dtype(
     [
@@ -26,7 +27,6 @@ STRIDE: Final = np.dtype(
 Stride: TypeAlias = Any  # a record of STRIDE
 
 TAU_HIGH = 0.2  # s: 0.8 Hz
-TAU_LOW = 0.04  # s, of each of two poles
 FORGET = 2.0  # s
 
 

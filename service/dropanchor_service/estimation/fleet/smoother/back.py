@@ -24,7 +24,6 @@ from dropanchor_service.estimation.fleet.belief.heading_reference import (
     turn_to_yaw,
 )
 from dropanchor_service.estimation.fleet.belief.layout import (
-    DRIFTING,
     MAGNETOMETER_MODEL,
     MOUNT,
     PHI,
@@ -92,7 +91,7 @@ def predict_moments(
             turn_columns(C, s, node)
         if bends:
             follow_tilt(s, P, node, rigid, t)
-    _follow_heading(s, P, C, one, node, row, after, enters)
+    _follow_heading(s, P, C, node, row, after, enters)
     _follow_branches(s, P, one, child, node, t)
     return s, P, C
 
@@ -111,9 +110,7 @@ def _cross(P: Floats, F: Floats, decay: Floats, C: Floats) -> None:
 
 
 @njit(nogil=True)
-def _follow_heading(
-    s: Floats, P: Floats, C: Floats, one: Traced, node: Node, row: Row, after: Trace, enters: bool
-) -> None:
+def _follow_heading(s: Floats, P: Floats, C: Floats, node: Node, row: Row, after: Trace, enters: bool) -> None:
     """Do to a prediction what the belief did when it took its north, or another model of it, from the node."""
     before = row.heading.model
     if enters:
@@ -134,7 +131,7 @@ def _follow_heading(
             _, slow, _ = reference_error(row, node.heading_var)
             row.heading.model = before
             add_reference_error(P, slow, False)
-    elif after.model != before and after.model != PLATFORM_MODEL and one.heading_class != DRIFTING:
+    elif after.model != before and after.model != PLATFORM_MODEL:
         _, was, _ = model_parameters(before, node.heading_var)
         _, now, _ = model_parameters(after.model, node.heading_var)
         P[REFERENCE, REFERENCE] += max(now * now - was * was, 0.0)

@@ -47,5 +47,5 @@ def test_a_row_forgets_the_parts_that_it_is_told_to_forget_and_no_others() -> No
     forget(row, PLACE)
     assert (row["start"]["known"], row["start"]["after_gap"]) == (0, 0)
     forget(row, TRACK)
-    assert (row["publication"]["resolved"], row["walk"]["carried"], row["heading"]["bank_started"]) == (0, 0, 0)
+    assert (row["publication"]["resolved"], row["walk"]["carried"], row["heading"]["models_started"]) == (0, 0, 0)
     assert TRACK & MISFIT

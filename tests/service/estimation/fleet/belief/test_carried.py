@@ -129,7 +129,7 @@ def test_who_is_carried_from_a_given_start_may_be_held_in_any_way_there() -> Non
 
 def test_what_a_vehicle_took_for_an_error_of_the_platforms_heading_is_forgotten() -> None:
     row, work, node = row_of_a_walk(2.0)
-    row["heading"]["bank_started"], row["heading"]["model"] = 1, 1
+    row["heading"]["models_started"], row["heading"]["model"] = 1, 1
     work[0]["heading_class"] = OWN_ERROR
     work[0]["mean"][YAW], work[0]["mean"][REFERENCE] = -2.0, 6.0
     node["heading_kind"], node["heading"], node["heading_var"], node["dyaw"] = MEASURED_HEADING, 1.0, 0.01, 0.3
@@ -137,7 +137,7 @@ def test_what_a_vehicle_took_for_an_error_of_the_platforms_heading_is_forgotten(
     np.testing.assert_allclose(work["mean"][:count, YAW] + node["dyaw"], 1.0)
     np.testing.assert_array_equal(work["mean"][:count, REFERENCE], 0.0)
     np.testing.assert_array_equal(work["heading_class"][:count], 0)
-    assert (row["heading"]["bank_started"], row["heading"]["model"]) == (0, 0)
+    assert (row["heading"]["models_started"], row["heading"]["model"]) == (0, 0)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from dropanchor_service.estimation.fleet.belief.layout import BELIEF, PHI, N
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.estimation.fleet.belief.publish import publish
 from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
-from dropanchor_service.estimation.fleet.frontend.node import NO_HEADING
+from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, NO_HEADING
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.belief import STATE, node_of
 from support.fleet_tracks import ANCHORS, drive, rows_of, run, track
@@ -43,7 +43,9 @@ def test_ranges_without_any_heading_wait_for_one() -> None:
 def test_a_place_that_is_as_good_as_the_compass_says_that_it_is_the_heading() -> None:
     rows = rows_of(1, known=False)
     rows["settings"]["reference_std"] = 0.5  # a compass beside steel: 5 m at 10 m, whatever the ranges say
-    beliefs = run(rows, make_pool(512), drive(2000).nodes)
+    nodes = drive(2000).nodes
+    nodes["heading_kind"] = ABSOLUTE_HEADING
+    beliefs = run(rows, make_pool(512), nodes)
     assert judged(beliefs)[-1] == (State.AMBIGUOUS, StateReason.HEADING_UNSURE)
     assert beliefs["sigma_pos"][-1] > 3.0
     assert not (beliefs["state"] == State.TRACKING).any()

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-START, BEFORE, AT_HEADING, AFTER = "start", "before prediction", "new heading model", "after prediction"
+START, BEFORE, AFTER = "start", "before prediction", "after prediction"
 BEFORE_RANGE, AFTER_RANGE, REDUCTION = "before a range", "after a range", "reduction"
 CLASSES, END, FIRST = "class check", "end", "first of all"
 

@@ -191,8 +191,8 @@ def collect_start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: T
     if node.heading_kind == NO_HEADING:
         row.publication.reason = NO_HEADING_YET
         return 0
-    if node.heading_kind == MEASURED_HEADING and row.heading.bank_started == 0:
-        reset_models(row, node.heading, node.heading_var, t)
+    if node.heading_kind == MEASURED_HEADING and row.heading.models_started == 0:
+        reset_models(row, node.heading, node.heading_var)
     if row.anchor < 0:
         row.publication.reason = NO_RANGE
         return 0

@@ -32,7 +32,7 @@ def forget(row: Row, parts: int) -> None:
     if parts & PLACE:
         row.start.known = row.start.after_gap = 0
     if parts & REFERENCE_ERROR:
-        row.heading.bank_started = row.heading.model = 0
+        row.heading.models_started = row.heading.model = 0
         row.heading.slow_var = 0.0
     if parts & MODE:
         row.publication.resolved = 0

@@ -1,9 +1,7 @@
-"""Classes of hypotheses: is it the heading reference or the gyroscope that is wrong, or neither?
+"""Classes of hypotheses: is the heading reference wrong?
 
 A heading reference with a slow error of its own explains the same ranges as one without for a long time. Both classes
 are therefore kept, and the ranges decide between them by the weights of their hypotheses.
-
-Gyroscope and heading are equally suspect when they drift apart.
 """
 
 import math
@@ -12,14 +10,10 @@ from dropanchor_service.estimation.fleet.belief.births import numbers as births
 from dropanchor_service.estimation.fleet.belief.heading_models import is_heading_std_given
 from dropanchor_service.estimation.fleet.belief.heading_reference import add_reference_error
 from dropanchor_service.estimation.fleet.belief.layout import (
-    DRIFT_MODEL,
-    DRIFTING,
-    EXACT,
     GYRO_BIAS,
     OWN_ERROR,
     PLATFORM_MODEL,
     Hypotheses,
-    Hypothesis,
     Row,
 )
 from dropanchor_service.estimation.fleet.belief.mixture import copy_hypothesis
@@ -34,15 +28,7 @@ def is_due(kind: int, work: Hypotheses, count: int, row: Row, node: Node) -> boo
     """Return whether row and node ask for another class."""
     if kind == births.OWN_ERROR:
         return may_have_own_error(row, node)
-    if kind == births.DRIFT:
-        return drifts_apart(work, count, row)
     return has_lost_own_error(work, count, row)
-
-
-@njit(nogil=True)
-def admits(kind: int, one: Hypothesis) -> bool:
-    """Return whether a hypothesis is of the class that changes."""
-    return bool(kind != births.DRIFT or one.heading_class == EXACT)
 
 
 @njit(nogil=True)
@@ -50,19 +36,9 @@ def make(kind: int, work: Hypotheses, source: int, target: int, row: Row, t: Tun
     """Copy `source` to `target` for another class."""
     if kind == births.OWN_ERROR:
         copy_own_error(work, source, target, row, t, not math.isfinite(row.start.heading))
-    elif kind == births.OWN_ERROR_AGAIN:
+    else:
         copy_own_error(work, source, target, row, t, False)
         work[target].log_weight += own_error_log_prior(row, t)  # beside that of trying again
-    else:
-        copy_drifting(work, source, target)
-
-
-@njit(nogil=True)
-def _count_of(work: Hypotheses, count: int, heading_class: int) -> int:
-    total = 0
-    for h in range(count):
-        total += work[h].heading_class == heading_class
-    return total
 
 
 @njit(nogil=True)
@@ -92,20 +68,9 @@ def copy_own_error(work: Hypotheses, source: int, target: int, row: Row, t: Tuni
 
 
 @njit(nogil=True)
-def drifts_apart(work: Hypotheses, count: int, row: Row) -> bool:
-    """Return whether heading and gyroscope drift apart, and no hypothesis says yet that it is the gyroscope."""
-    return bool(row.heading.model == DRIFT_MODEL and _count_of(work, count, DRIFTING) == 0)
-
-
-@njit(nogil=True)
-def copy_drifting(work: Hypotheses, source: int, target: int) -> None:
-    """Copy `source` for a gyroscope that drifts."""
-    copy_hypothesis(work, source, target)
-    work[target].heading_class = DRIFTING
-
-
-@njit(nogil=True)
 def has_lost_own_error(work: Hypotheses, count: int, row: Row) -> bool:
     """Return whether no hypothesis of a resolved row has a reference with an error of its own."""
-    resolved = row.publication.resolved == 1 and not is_heading_std_given(row)
-    return bool(resolved and _count_of(work, count, OWN_ERROR) == 0)
+    resolved, of_class = row.publication.resolved == 1 and not is_heading_std_given(row), 0
+    for h in range(count):
+        of_class += work[h].heading_class == OWN_ERROR
+    return bool(resolved and of_class == 0)

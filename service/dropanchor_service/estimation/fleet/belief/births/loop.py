@@ -70,8 +70,6 @@ def admits(kind: int, one: Hypothesis, row: Row, t: Tuning) -> bool:
         return sight.admits(kind, one, row, t)
     if kind in OF_SPLITTING:
         return splitting.admits(kind, one, row, t)
-    if kind in OF_HEADING:
-        return heading_classes.admits(kind, one)
     if kind in OF_MOUNTING:
         return mounting.admits(kind, one)
     return True

@@ -8,7 +8,6 @@ from dropanchor_service.estimation.fleet.belief.births.loop import bear
 from dropanchor_service.estimation.fleet.belief.births.numbers import (
     ALIGNED,
     DEVICE_TURN,
-    DRIFT,
     MOUNT_CELLS,
     OWN_ERROR,
     OWN_ERROR_AGAIN,
@@ -57,12 +56,6 @@ def before_prediction(work: Hypotheses, count: int, row: Row, node: Node, t: Tun
     count = bear(TURN_AFTER_STOP, TURN_AFTER_STOP, work, count, row, node, t, scratch)
     follow_rest(work, count, row, node)
     return count
-
-
-@njit(nogil=True)
-def at_new_heading_model(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> int:
-    """Let the gyroscope drift by a new model of the heading's error. Return the count of hypotheses."""
-    return bear(DRIFT, DRIFT, work, count, row, node, t, scratch)
 
 
 @njit(nogil=True)

@@ -4,27 +4,12 @@ from dropanchor_service.estimation.fleet.belief.births import numbers
 from dropanchor_service.estimation.fleet.belief.births.birth import (
     AFTER,
     AFTER_RANGE,
-    AT_HEADING,
     BEFORE_RANGE,
     CLASSES,
     Birth,
 )
 
 MEASUREMENTS = (
-    Birth(
-        numbers.DRIFT,
-        "drifting-gyroscope",
-        AT_HEADING,
-        "heading and gyroscope drift apart; none of that class",
-        "exact heading",
-        "drifting gyroscope",
-        "0",
-        "–",
-        "at a change of the heading model",
-        "none",
-        "no row; a gyroscope that drifts by 0.03 rad/s",
-        38,
-    ),
     Birth(
         numbers.WIDENED,
         "widened",
