@@ -17,6 +17,8 @@ FIELD: Final = (*PATHS, *HEADINGS, "magdist")
 """Typical problems in the field, which the simulator makes: its perturbations of these names."""
 BIASES: Final = ("bias0.03", "rested0.1")
 """Standard deviations of the gyroscope's bias, rad/s; rested: after a rest of `REST_S`."""
+QUIET: Final = "quiet"
+"""An IMU that filters all vibration away: 0.02 m/s² and 0.0015 rad/s of noise, moving and at rest."""
 REST_S: Final = 5.0  # s that a tag lies where somebody has put it, before it moves
 MOUNTS: Final = ("mount90", "mount-90", "mount135", "mount180")  # degrees
 

@@ -6,7 +6,7 @@ from fnmatch import fnmatchcase
 from itertools import product
 from pathlib import Path
 
-from dropanchor_evaluation.product.disturbances import BIASES, FIELD, HEADINGS, MOUNTS, PATHS, RANGE_ERRORS
+from dropanchor_evaluation.product.disturbances import BIASES, FIELD, HEADINGS, MOUNTS, PATHS, QUIET, RANGE_ERRORS
 from dropanchor_evaluation.recordings import recordings_in
 
 DEVELOPMENT_SEEDS = range(5000, 6000)
@@ -77,8 +77,9 @@ def simulated_rows() -> list[Row]:
     ]
     biased = [(f"{motion}+{what}", "9-axis", "nothing") for motion in ("S5", "forklift") for what in BIASES]
     biased += [("S5+rested0.1", "6-axis", "nothing")]
+    quiet = [(f"rolling+{QUIET}", "9-axis", configured) for configured in ("everything", "nothing")]
     turned = [(f"{motion}+{what}", "9-axis", "nothing") for motion in TURNED for what in MOUNTS]
-    every = (*fast, *full, *loose, *bare, *noisy, *hard, *biased, *turned)
+    every = (*fast, *full, *loose, *bare, *noisy, *hard, *biased, *quiet, *turned)
     return [Row(*what, start) for what in every for start in STARTS]
 
 

@@ -92,7 +92,10 @@ def sensor_models(row: Row) -> SensorModels:
         models = perturbed(models, row.disturbance)
     if (std := disturbances.gyro_bias_std(row.disturbance)) is not None:
         models = replace(models, imu=replace(models.imu, gyro_bias_std=std))
-    return smooth(models) if row.scenario == "rolling" else models
+    models = smooth(models) if row.scenario == "rolling" else models
+    if row.disturbance == disturbances.QUIET:
+        models = replace(models, imu=replace(models.imu, acc_std=0.02, gyro_std=0.0015))
+    return models
 
 
 def _of_simulation(row: Row, run: Simulation) -> TagRun:

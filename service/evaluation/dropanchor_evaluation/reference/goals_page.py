@@ -104,11 +104,16 @@ HONEST: Final = (
     ),
     Honesty(
         "a gyroscope that is worse than the prior says",
-        ("*+bias*/*", "*+gdrift/*"),
-        "a bias above 0.05 rad/s looks like the slow turn of a hand, so a rest does not teach it; none is expected to "
+        ("*+bias*/*", "*+rested*/*", "*+gdrift/*"),
+        "a rest of a second does not tell a bias above 0.05 rad/s from the slow turn of a hand; none is expected to "
         "swing by 0.03 rad/s within a minute",
     ),
-    Honesty("smooth rolling", ("rolling*/*",), "a gyroscope that no rest teaches"),
+    Honesty("smooth rolling", ("rolling/*", "rolling+mount*/*"), "a gyroscope that no rest teaches"),
+    Honesty(
+        "smooth rolling with an IMU that filters all vibration away",
+        ("rolling+quiet/*",),
+        "a ramp of the speed looks like a tilt at rest, and no hypothesis doubts a rest that the ranges contradict",
+    ),
     Honesty("carried in the hand", ("walk-hand/*",), "with an unknown start few poses are `tracking`"),
     Honesty("in a pocket", ("walk-pocket/*",), "the direction of the steps of an upright device may be anything"),
     Honesty("turned on the way", ("walk-turned/*",), "a turn of the device is taken for one of the walker"),
