@@ -24,4 +24,6 @@ class Configured(NamedTuple):
 
     def is_turned_from(self, before: "Configured") -> bool:
         """Return whether the declination and its error are all that matters in the change from `before`."""
-        return self[1:] != before[1:] and not self.matters_after(self._replace(tag=before.tag))
+        return self.matters_after(before) and not self.matters_after(
+            before._replace(declination_rad=self.declination_rad, declination_std_rad=self.declination_std_rad)
+        )

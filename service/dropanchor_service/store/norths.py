@@ -11,7 +11,7 @@ class North(NamedTuple):
 
 
 class Norths:
-    """What tracks tell, by row of a tag. The ingest thread writes; any thread reads."""
+    """What tracks tell, by row of a tag. The ingest thread writes, whoever deletes a tag forgets; any thread reads."""
 
     def __init__(self) -> None:
         self._of_rows: dict[int, North] = {}

@@ -19,7 +19,7 @@ from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from support.golden_checkpoint import Drive, golden, halves
 
 EARLIER = f"{layouts.VERSION - 1}-{'0' * 16}"
-LAYOUT = "8-a15196d1ea678c0a"
+LAYOUT = "8-0e3502a0563ac006"
 READ = range(layouts.VERSION - layouts.READ_BEFORE, layouts.VERSION)
 
 

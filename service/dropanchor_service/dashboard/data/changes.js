@@ -80,6 +80,11 @@ export class Changes extends EventTarget {
     });
   }
 
+  /** Do something, and tell when it fails. @param {() => Promise<void>} send */
+  attempt(send) {
+    return this.#attempt("", send);
+  }
+
   /** Delete a resource as it is now. @param {string} what @param {string} path */
   remove(what, path) {
     return this.#attempt(what, async () => this.apply(what, path, await this.read(path), null));

@@ -8,9 +8,12 @@ import { t } from "../i18n/language.js";
 export const isNorthOffered = (explanation) => (explanation?.uncertainty?.phrase.values["cure.code"] ?? "").startsWith("site_north");
 
 /** Turn north of the site, unless the tags no longer tell that it is off. @param {import("../data/changes.js").Changes} changes */
-export async function applyNorth(changes) {
-  const { value } = await changes.read("site/north");
-  if (!value.offered) return;
-  const turn = compassTurn(value.learned_rad - value.declination_rad);
-  await changes.editAsIs(t("north.applied", { turn }), "site", { declination_rad: value.learned_rad, declination_std_rad: value.std_rad });
+export function applyNorth(changes) {
+  return changes.attempt(async () => {
+    const { value } = await changes.read("site/north");
+    if (!value.offered) return;
+    const turn = compassTurn(value.learned_rad - value.declination_rad);
+    const patch = { declination_rad: value.learned_rad, declination_std_rad: value.std_rad };
+    await changes.editAsIs(t("north.applied", { turn }), "site", patch);
+  });
 }

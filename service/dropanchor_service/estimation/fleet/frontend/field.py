@@ -69,6 +69,10 @@ def start_magnetometer(g: Magnetometer, mx: float, my: float, mz: float, hard_ir
     g.age = NOISE_PRIOR
     g.changed = 0
     g.since_last = 0.0
+    g.elapsed = 0.0
+    g.count = 0.0
+    g.sum_m[:] = 0.0
+    g.sum_R[:] = 0.0
 
 
 @njit(cache=True, nogil=True)

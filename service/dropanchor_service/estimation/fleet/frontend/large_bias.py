@@ -2,7 +2,8 @@
 
 Such a tag looks as if it turned evenly. It does not turn if the magnetometer says so: a field m in the body frame that
 turned by the angle a would change by |a x m|, and does not change by a tenth of it. Without a magnetometer only
-the first rest can tell: nobody switches a tag on and turns it evenly, without shaking, for seconds.
+the first rest of a new tag can tell: nobody switches a tag on and turns it evenly, without shaking, for seconds.
+A bias that was found so is doubted in the same way, so that a false one goes at the next rest.
 The attitude has been turned by the bias all the while. It goes back to where it was, and the field is learned anew.
 """
 
@@ -13,7 +14,14 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.standstill import BIAS_SD, TAU, Standstill, is_steady
+from dropanchor_service.estimation.fleet.frontend.standstill import (
+    BIAS_SD,
+    RATE,
+    RATE_KNOWN,
+    TAU,
+    Standstill,
+    is_steady,
+)
 
 LARGE_BIAS = np.dtype(
     [
@@ -25,23 +33,27 @@ LARGE_BIAS = np.dtype(
         ("turned_then", "f8", 3),  # rad, mean of `turned` at the same samples
         ("first", "f8", 3),  # `field` after `AVERAGED` samples
         ("turned_first", "f8", 3),  # and `turned_then`
-        ("shaken", "u1"),  # 1: it has not been steady all the time since the first sample
+        ("last", "f8", 3),  # sample of the field before
+        ("first_rest", "u1"),  # 1: the tag is new, and has been steady all the time since its first sample
     ]
 )
 LargeBias: TypeAlias = Any  # a record of LARGE_BIAS
 
 UNKNOWN = 0.5  # of the prior's variance, above which no rest has told the bias
 AVERAGED = 10.0  # samples of the field that are averaged
-TURN, FULL_TURN = 0.1, 1.0  # relative change of the field that is enough to see, and too large to tell
+LARGEST = 0.5  # rad/s: 20 deg/s of an axis are the worst of data sheets
+TURN = 0.1  # relative change of the field that is enough to see
+FULL_TURN = 1.0  # relative change after which a field may have come back
 STILL = 0.1  # share of it that a field at rest shows
 FIRST_REST = 3.0  # s, of the rest that tells without a magnetometer
 
 
 @njit(nogil=True)
-def start_large_bias(one: LargeBias) -> None:
-    """Start with the first sample."""
+def start_large_bias(one: LargeBias, new: bool) -> None:
+    """Start with the first sample. new: it is the first one of the tag, and not of a restart."""
     one.steady_s = 0.0
-    one.shaken = 0
+    one.last[:] = math.nan
+    one.first_rest = 1 if new else 0
 
 
 @njit(nogil=True)
@@ -56,7 +68,10 @@ def begin_steady(one: LargeBias, q: Array) -> None:
 
 @njit(nogil=True)
 def add_field(one: LargeBias, mag: Array) -> None:
-    """Add a sample of the field to the mean, and the angle turned until then to its own."""
+    """Add a sample of the field to the mean, and the angle turned until then to its own. Skip one that repeats."""
+    if mag[0] == one.last[0] and mag[1] == one.last[1] and mag[2] == one.last[2]:
+        return
+    one.last[:] = mag
     one.fields += 1.0
     k = 1.0 / min(one.fields, AVERAGED)
     for i in range(3):
@@ -81,30 +96,50 @@ def changes_of_field(one: LargeBias) -> tuple[float, float]:
 @njit(nogil=True)
 def shows_rest(one: LargeBias) -> bool:
     """Return whether what the gyroscope has read since the tag is steady was its bias."""
-    if one.fields == 0.0:
-        return one.shaken == 0 and one.steady_s > FIRST_REST  # type: ignore[no-any-return]
     if one.fields <= AVERAGED:
-        return False
+        return one.first_rest == 1 and one.steady_s > FIRST_REST  # type: ignore[no-any-return]
     would, has = changes_of_field(one)
     if would > FULL_TURN:
         one.steady_s = 0.0
+        return False
     return would > TURN and has < STILL * would
 
 
 @njit(nogil=True)
 def may_be_at_rest(one: LargeBias, s: Standstill) -> bool:
     """Return whether the first steady time of the tag is under way, and it may turn or rest."""
-    return one.shaken == 0 and one.steady_s > 0.0 and s.seen > TAU  # type: ignore[no-any-return]
+    return one.first_rest == 1 and one.steady_s > 0.0 and s.seen > TAU  # type: ignore[no-any-return]
+
+
+@njit(nogil=True)
+def was_told(s: Standstill, bias: Array) -> bool:
+    """Return whether a rest has told the bias, and one that the standstill sees."""
+    size = math.sqrt(bias[0] * bias[0] + bias[1] * bias[1] + bias[2] * bias[2])
+    return s.bias_var < UNKNOWN * BIAS_SD * BIAS_SD and size < RATE_KNOWN + RATE
+
+
+@njit(nogil=True)
+def take_rate(one: LargeBias, s: Standstill, bias: Array) -> bool:
+    """Take the mean rate since the tag is steady for bias, if it is still the same and a bias can be as large."""
+    square = change = 0.0
+    for i in range(3):
+        mean = bias[i] + one.turned[i] / one.steady_s
+        square += mean * mean
+        change += (s.mean[3 + i] - mean) ** 2
+    if square > LARGEST * LARGEST or change > RATE_KNOWN * RATE_KNOWN:
+        return False
+    for i in range(3):
+        bias[i] += one.turned[i] / one.steady_s
+    return True
 
 
 @njit(nogil=True)
 def found_large_bias(one: LargeBias, s: Standstill, dt: float, gyro: Array, bias: Array, mag: Array, q: Array) -> bool:
     """Take one sample before its rate turns the attitude. Return whether `bias` and q are set to what a rest told."""
-    if s.bias_var < UNKNOWN * BIAS_SD * BIAS_SD:
-        return False
-    if not is_steady(s):
-        one.shaken = 1
-    if not is_steady(s) or s.quiet > 0.0 or dt == 0.0:
+    steady = is_steady(s)
+    if not steady:
+        one.first_rest = 0
+    if not steady or s.quiet > 0.0 or dt == 0.0 or was_told(s, bias):
         one.steady_s = 0.0
         return False
     if one.steady_s == 0.0:
@@ -112,12 +147,12 @@ def found_large_bias(one: LargeBias, s: Standstill, dt: float, gyro: Array, bias
     one.steady_s += dt
     for i in range(3):
         one.turned[i] += dt * (gyro[i] - bias[i])
-    if math.isfinite(mag[0] + mag[1] + mag[2]) and mag[0] * mag[0] + mag[1] * mag[1] + mag[2] * mag[2] > 0.0:
+    if math.isfinite(mag[0] + mag[1] + mag[2]):
         add_field(one, mag)
     if not shows_rest(one):
         return False
-    for i in range(3):
-        bias[i] += one.turned[i] / one.steady_s
-    q[:] = one.q
+    found = take_rate(one, s, bias)
+    if found:
+        q[:] = one.q
     one.steady_s = 0.0
-    return True
+    return found

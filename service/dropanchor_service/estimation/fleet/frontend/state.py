@@ -28,6 +28,7 @@ FRONTEND = np.dtype(
         ("t_node", "i8"),  # ns, end of the last node
         ("bias_end", "f8"),  # rad/s, the gyroscope's bias about the vertical when the last node ended
         ("running", "u1"),  # 0: no sample yet
+        ("new", "u1"),  # 1: there was none before it was configured
         ("absolute", "u1"),  # 1: the heading is referred to north
         ("turned", "f8"),  # rad since start, net
         ("drift_var", "f8"),  # rad^2, of yaw since start
@@ -47,6 +48,7 @@ def start_frontend(f: Frontend, hard_iron: float, declination: float, motion: in
     hard_iron: prior sd of the magnetometer's offset in units of the field; 1 for a bare one, 0.05 for a calibrated one.
     declination: rad, true minus magnetic north, positive east. motion: the setting.
     """
+    f.new = 1 - f.running
     f.running = 0
     f.carrying.motion = motion
     f.t_node = 0
@@ -71,7 +73,7 @@ def start_at(f: Frontend, t_ns: int, acc: Array, gyro: Array) -> None:
     f.bias_end = 0.0
     a.gravity = G0
     start_standstill(s, acc, gyro)
-    start_large_bias(f.large_bias)
+    start_large_bias(f.large_bias, f.new == 1)
     p.V[:] = 0.0
     p.a[:] = 0.0
     p.V_end[:] = 0.0
@@ -83,10 +85,6 @@ def start_at(f: Frontend, t_ns: int, acc: Array, gyro: Array) -> None:
     p.extrapolated_s = 0.0
     p.no_acc_s = 0.0
     p.tilt_gain = 0.0
-    f.magnetometer.elapsed = 0.0
-    f.magnetometer.count = 0.0
-    f.magnetometer.sum_m[:] = 0.0
-    f.magnetometer.sum_R[:] = 0.0
     start_carrying(f.carrying, a.gravity, f.carrying.motion)
     if math.isfinite(acc[0] + acc[1] + acc[2]):
         level_attitude(a.q, acc[0], acc[1], acc[2])

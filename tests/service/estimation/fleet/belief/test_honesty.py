@@ -98,7 +98,7 @@ def test_most_tracks_far_from_their_ranges_are_given_up_within_five_seconds_and_
     assert np.median(ends) < 1.0
 
 
-def test_the_ranges_distinguish_a_drifting_gyroscope_from_a_drifting_heading() -> None:
+def test_a_drifting_gyroscope_beside_a_heading_does_not_mislead() -> None:
     runs = [(track(d, known=True), d) for d in map(drifting, range(2000, 2012))]
     assert np.median([np.sqrt(np.mean(distance(b, d) ** 2)) for b, d in runs]) < 0.5
     assert np.mean([inside(b, d)[20:].mean() for b, d in runs]) > 0.93
