@@ -1,8 +1,8 @@
 """A gyroscope's bias that no data sheet allows: cheap ones read 5 to 20 degrees per second at rest.
 
 Such a tag looks as if it turned evenly. It does not turn if the magnetometer says so: a field m in the body frame that
-turned by the angle a would change by |a x m|, and does not change by a tenth of it. Without a magnetometer only
-the first rest of a new tag can tell: nobody switches a tag on and turns it evenly, without shaking, for seconds.
+turned by the angle a would change by |a x m|, and does not change by a tenth of it. Without a field, or about its axis,
+only the first rest of a new tag can tell: nobody switches a tag on and turns it evenly, without shaking, for seconds.
 A bias that was found so is doubted in the same way, so that a false one goes at the next rest.
 The attitude has been turned by the bias all the while. It goes back to where it was, and the field is learned anew.
 """
@@ -96,13 +96,15 @@ def changes_of_field(one: LargeBias) -> tuple[float, float]:
 @njit(nogil=True)
 def shows_rest(one: LargeBias) -> bool:
     """Return whether what the gyroscope has read since the tag is steady was its bias."""
-    if one.fields <= AVERAGED:
-        return one.first_rest == 1 and one.steady_s > FIRST_REST  # type: ignore[no-any-return]
-    would, has = changes_of_field(one)
+    would = has = 0.0
+    if one.fields > AVERAGED:
+        would, has = changes_of_field(one)
     if would > FULL_TURN:
         one.steady_s = 0.0
         return False
-    return would > TURN and has < STILL * would
+    if would < TURN:  # there is no field, or the bias is about its axis
+        return one.first_rest == 1 and one.steady_s > FIRST_REST and has < STILL * TURN
+    return has < STILL * would
 
 
 @njit(nogil=True)
