@@ -1,6 +1,6 @@
 """Compile all kernels, on two processors where there are two.
 
-The belief of the estimator takes as long as all else together, and the two share no kernel that takes long.
+The belief and the front-end of the estimator take about as long, and share no kernel that takes long.
 """
 
 import subprocess
@@ -25,16 +25,18 @@ from dropanchor_service.settings.model import Settings
 def compile_all() -> None:
     """Fill the cache of the kernels."""
     use_kernel_cache()
-    with _others_apart():
+    with _front_end_apart():
         warm_up_belief()
+        warm_up_ingest()
+        warm_up_answers()
     create_engine(Settings(engine="fleet"))  # loads what is compiled, and compiles what is missing
 
 
 @contextmanager
-def _others_apart() -> Iterator[None]:
-    """Compile all but the belief in another process meanwhile, if there is a processor for it."""
+def _front_end_apart() -> Iterator[None]:
+    """Compile all else in another process meanwhile, if there is a processor for it."""
     if usable_processors() < 2:
-        _warm_up_others()
+        _warm_up_front_end()
         yield
         return
     with subprocess.Popen([sys.executable, "-m", __name__], stdin=subprocess.DEVNULL) as other:
@@ -45,13 +47,11 @@ def _others_apart() -> Iterator[None]:
             raise
 
 
-def _warm_up_others() -> None:
-    warm_up_ingest()
-    warm_up_answers()
-    warm_up_zones()
+def _warm_up_front_end() -> None:
     warm_up_front_end()
+    warm_up_zones()
 
 
 if __name__ == "__main__":
-    logs.configure("ERROR")  # the other process, which takes longer, tells of its progress
-    _warm_up_others()
+    logs.configure("ERROR")  # the other process tells of its progress
+    _warm_up_front_end()
