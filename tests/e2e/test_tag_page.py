@@ -61,6 +61,7 @@ def test_a_phone_that_opens_the_link_of_its_key_has_a_pose(tmp_path: Path, capsy
             page.move(shake=0.8)
             page.wait_for("document.getElementById('state').textContent === 'Tracking'")
             page.wait_for("counts.sent > 600")
+            page.wait_for("document.getElementById('state').textContent === 'Tracking'")  # it may have been in doubt
             pose = service.ask("GET", "/api/v1/tags/anna/pose", headers={"authorization": f"Bearer {reader}"}).json()
             assert page.errors == []
             page.page.screenshot(path=tmp_path / "tracking.png")

@@ -221,9 +221,9 @@ def test_north_that_others_know_is_applied_with_one_click_and_may_be_undone(chro
     tags, site = place.bench.answers.tags, place.bench.answers.site
     for name in ("a", "b"):
         tags.rows.norths.set(tags.register(name).row, North(-2.4, 0.1))
-    drive(place, parts=(0.2, 0.05, 0.0, 0.07, 0.04, 0.0))
-    tags.rows.count_samples("imu", np.array([tags.register("cart").row]))
     with watched_page(chromium, place.url, reduced_motion="reduce") as watched:
+        drive(place, parts=(0.2, 0.05, 0.0, 0.07, 0.04, 0.0))
+        tags.rows.count_samples("imu", np.array([tags.register("cart").row]))
         select(watched)
         box = watched.page.locator("[data-part='uncertainty']")
         expect(box.locator("p")).to_contain_text(
