@@ -25,7 +25,7 @@ from dropanchor_service.settings.model import Settings
 def compile_all() -> None:
     """Fill the cache of the kernels."""
     use_kernel_cache()
-    with _front_end_apart():
+    with _rest_apart():
         warm_up_belief()
         warm_up_ingest()
         warm_up_answers()
@@ -33,10 +33,10 @@ def compile_all() -> None:
 
 
 @contextmanager
-def _front_end_apart() -> Iterator[None]:
-    """Compile all else in another process meanwhile, if there is a processor for it."""
+def _rest_apart() -> Iterator[None]:
+    """Compile the rest in another process meanwhile, if there is a processor for it."""
     if usable_processors() < 2:
-        _warm_up_front_end()
+        _warm_up_rest()
         yield
         return
     with subprocess.Popen([sys.executable, "-m", __name__], stdin=subprocess.DEVNULL) as other:
@@ -47,11 +47,11 @@ def _front_end_apart() -> Iterator[None]:
             raise
 
 
-def _warm_up_front_end() -> None:
+def _warm_up_rest() -> None:
     warm_up_front_end()
     warm_up_zones()
 
 
 if __name__ == "__main__":
     logs.configure("ERROR")  # the other process tells of its progress
-    _warm_up_front_end()
+    _warm_up_rest()

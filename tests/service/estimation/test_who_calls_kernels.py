@@ -43,7 +43,20 @@ def names_outside_of_kernels(node: ast.AST) -> Iterator[str]:
             continue
         if isinstance(child, ast.Name) and isinstance(child.ctx, ast.Load):
             yield child.id
+        if isinstance(child, ast.Attribute) and isinstance(child.value, ast.Name):
+            yield f"{child.value.id}.{child.attr}"
         yield from names_outside_of_kernels(child)
+
+
+def imported(node: ast.ImportFrom, inner: set[tuple[str, str]]) -> dict[str, tuple[str, str]]:
+    """Return the inner kernels by the names that they have after an import, also of the module that they are in."""
+    known = {}
+    for alias in node.names:
+        name, package = alias.asname or alias.name, f"{node.module}.{alias.name}"
+        if (node.module, alias.name) in inner:
+            known[name] = (node.module or "", alias.name)
+        known |= {f"{name}.{kernel}": (module, kernel) for module, kernel in inner if module == package}
+    return known
 
 
 def test_python_calls_no_inner_kernel() -> None:
@@ -54,11 +67,7 @@ def test_python_calls_no_inner_kernel() -> None:
         known = {name: (module_of(path), name) for module, name in inner if module == module_of(path)}
         for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom):
-                known |= {
-                    alias.asname or alias.name: (node.module or "", alias.name)
-                    for alias in node.names
-                    if (node.module, alias.name) in inner
-                }
+                known |= imported(node, inner)
         called += [(path.name, known[name]) for name in names_outside_of_kernels(tree) if name in known]
 
     assert called == [], "give them cache=True, which makes them callable"
