@@ -110,7 +110,9 @@ class WatchedPage:
         """
         end_s = time.monotonic() + timeout_s
         while not self.page.evaluate(condition):
-            assert time.monotonic() < end_s, f"not within {timeout_s} s: {condition}"
+            if time.monotonic() > end_s:
+                status = self.page.evaluate("window.dropanchor?.status?.()")
+                raise AssertionError(f"not within {timeout_s} s: {condition}; status: {status}, errors: {self.errors}")
             self.page.wait_for_timeout(50)
 
     def wait_for_map(self, visible: int) -> None:

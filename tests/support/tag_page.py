@@ -134,7 +134,7 @@ class TagPage:
         script = f"() => {{ const counts = window.dropanchor?.counts() ?? {{}}; return ({condition}); }}"
         end_s = time.monotonic() + timeout_s
         while not self.page.evaluate(script):
-            assert time.monotonic() < end_s, f"not within {timeout_s} s: {condition}"
+            assert time.monotonic() < end_s, f"not within {timeout_s} s: {condition}; the page: {self.text('live')}"
             self.page.wait_for_timeout(50)
 
     def text(self, element: str) -> str:

@@ -1,10 +1,11 @@
-"""The WebSocket protocol of the server: uvicorn's, with three changes."""
+"""The WebSocket protocol of the server: uvicorn's, with four changes."""
 
 import asyncio
 import logging
 from typing import Any
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.protocol import State
 
 from dropanchor_service.api.http.open_sockets import OpenSockets
 
@@ -33,6 +34,12 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
         await super().send(message)
         if self.close_sent and self._sockets is not None and not self.transport.is_closing():
             self._sockets.note_silent(self._number)
+
+    def shutdown(self) -> None:
+        """End the connection while the server stops. uvicorn's own raises when the client has just ended it."""
+        if self.conn.state in (State.CLOSING, State.CLOSED):
+            self.close_sent = True
+        super().shutdown()
 
     def keepalive_timeout(self) -> None:
         """Disconnect a client that did not answer a ping. A clean end would wait until it reads again."""

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from starlette.types import Receive, Scope, Send
+from websockets.asyncio.client import connect
 
 from dropanchor_service.api.app import MAX_BODY_BYTES
 from dropanchor_service.api.http.limits import GuardedProtocol
@@ -203,3 +204,34 @@ def test_a_connection_that_is_accepted_while_the_server_stops_is_closed(monkeypa
         asyncio.run(serve_until_the_first())
         assert _ended(client)
     gc.collect()  # warns of a transport that nobody closed
+
+
+def test_a_web_socket_that_its_client_has_just_ended_can_be_shut_down() -> None:
+    bound = listen("127.0.0.1", 0)
+    shut_down: list[int] = []
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "websocket":
+            return
+        await receive()
+        await send({"type": "websocket.accept"})
+        message = await receive()
+        assert message["type"] == "websocket.disconnect"
+        try:
+            for connection in list(server.server_state.connections):  # as the server does when it is asked to stop now
+                connection.shutdown()
+                shut_down.append(message["code"])
+        finally:
+            server.ask_to_stop()
+
+    server = build_server(app, Event())
+
+    async def talk() -> None:
+        serving = asyncio.create_task(server.serve(sockets=[bound]))
+        async with connect(f"ws://127.0.0.1:{bound.getsockname()[1]}", proxy=None):
+            pass
+        await serving
+
+    bound.listen()
+    asyncio.run(talk())
+    assert shut_down == [1000]
