@@ -224,6 +224,8 @@ def test_north_that_others_know_is_applied_with_one_click_and_may_be_undone(chro
     with watched_page(chromium, place.url, reduced_motion="reduce") as watched:
         drive(place, parts=(0.2, 0.05, 0.0, 0.07, 0.04, 0.0))
         tags.rows.count_samples("imu", np.array([tags.register("cart").row]))
+        for name in ("a", "b"):  # else their rows appear where the next one is clicked
+            watched.page.locator(f"tr[data-tag='{name}']").wait_for()
         select(watched)
         box = watched.page.locator("[data-part='uncertainty']")
         expect(box.locator("p")).to_contain_text(

@@ -8,7 +8,7 @@ from threading import Event
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, Page, Route
 
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
@@ -109,3 +109,22 @@ def test_the_states_come_back_with_the_connection(chromium: Browser) -> None:
             lost.page.page.locator(".chip[data-state='tracking']", has_text="6").wait_for()
             lost.page.page.locator("td.c-state", has_text=State.TRACKING.name.capitalize()).first.wait_for()
             assert lost.page.page.title() == "Dropanchor"
+
+
+def test_a_stream_that_nobody_answers_is_asked_for_again(chromium: Browser) -> None:
+    bench = live_api_bench()
+    asked: list[str] = []
+
+    def leave_the_first_without_an_answer(route: Route) -> None:
+        asked.append(route.request.url)
+        if len(asked) > 1:
+            route.continue_()
+
+    def intercept(page: Page) -> None:
+        page.route("**/api/v1/stream*", leave_the_first_without_an_answer)
+
+    with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+        place = Place(bench, f"http://127.0.0.1:{port}/")
+        with watched_page(chromium, place.url, reduced_motion="reduce", prepare=intercept) as page:
+            show_six(place, page)
+            assert len(asked) == 2

@@ -56,11 +56,11 @@ def height(part: Locator) -> float:
 
 def settled_height(page: WatchedPage, part: Locator) -> float:
     """Return the height once it stays: the details grow when the explanation of the tag has come."""
-    before = -1.0
-    while height(part) != before:
-        before = height(part)
-        page.page.wait_for_timeout(600)  # explanations are asked for twice a second
-    return before
+    seen = [height(part)]
+    while len(seen) < 4 or len(set(seen[-4:])) > 1:
+        page.page.wait_for_timeout(600)  # explanations are asked for twice a second, and may take a while
+        seen.append(height(part))
+    return seen[-1]
 
 
 def width(part: Locator) -> float:

@@ -16,6 +16,8 @@ const RETRY_MS = [500, 1000, 2000, 3000];
 const STARTING_MS = 1000;
 const PROBE_MS = 3000;
 const PROBE_TIMEOUT_MS = 4000;
+/** Time in which the service begins to answer when it is asked for the stream. */
+const STREAM_TIMEOUT_MS = 10_000;
 
 /** The site that the page shows, of a service with several: `?site=` in its address; null: the only one. */
 export const chosenSite = new URLSearchParams(globalThis.location?.search ?? "").get("site");
@@ -86,8 +88,9 @@ export class Connection extends EventTarget {
 
   /** @param {AbortSignal} signal */
   async #follow(signal) {
+    const late = setTimeout(() => signal.aborted || this.#failed(), STREAM_TIMEOUT_MS);
     try {
-      const response = await request(api(`stream?max_hz=${this.#max_hz}`), { signal });
+      const response = await request(api(`stream?max_hz=${this.#max_hz}`), { signal }).finally(() => clearTimeout(late));
       this.#opened();
       for await (const { name, data } of eventsOf(response)) {
         if (name === "settings") this.refresh();
