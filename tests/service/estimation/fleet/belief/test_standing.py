@@ -37,7 +37,13 @@ def judged(*speeds: tuple[float, float, float], quiet_share: float | None = None
     [(2.0, 0.1, MOVING), (2.0, 2.0, RESTING), (0.05, 0.05, RESTING), (0.5, 0.1, MOVING), (0.5, 0.4, RESTING)],
 )
 def test_a_speed_that_is_far_from_zero_refutes_a_rest(speed: float, std: float, rest: int) -> None:
-    assert judged((1.0, speed, std)) == rest
+    assert judged((1.0, speed, std), quiet_share=0.05) == rest
+
+
+def test_an_imu_that_was_never_seen_to_shake_says_less_of_a_rest() -> None:
+    assert judged((1.0, 0.05, 0.05)) == RESTING
+    assert judged((1.0, 0.5, 0.2)) == MOVING  # as a trolley that has just driven off smoothly
+    assert judged((1.0, 0.5, 0.2), quiet_share=0.05) == RESTING
 
 
 def test_a_tag_that_rides_without_vibration_needs_less_to_refute_a_rest() -> None:
