@@ -13,7 +13,7 @@ SPEEDS: Final = 2.5  # m/s, over which the speed of a moving tag is spread
 CERTAIN: Final = 3.0  # standard deviations from zero at which a tag certainly moves
 LIKELY: Final = 0.01  # weight from which on a hypothesis may deny that the tag moves
 QUIET_TAU: Final = 10.0  # s, over which the share of quiet motion is averaged
-QUIET_START, QUIET_MIN = 1.0, 0.005  # that share before any motion: an IMU may filter vibration; and the least of it
+QUIET_START, QUIET_MIN = 0.4, 0.005  # that share before any motion: an IMU may filter vibration; and the least of it
 SLOW: Final = 0.2  # m/s, of a tag that hardly moves
 
 
