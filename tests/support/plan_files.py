@@ -1,5 +1,6 @@
 """Files that people upload as floor plans, good and bad."""
 
+from contextlib import closing
 from io import BytesIO
 from typing import Any
 
@@ -26,10 +27,11 @@ def svg_file(inside: str = '<rect width="50" height="50"/>', attributes: str = '
 
 def pdf_file(*sizes: tuple[float, float]) -> bytes:
     """Return a PDF with empty pages of these sizes in points."""
-    document, file = PdfDocument.new(), BytesIO()
-    for size in sizes:
-        document.new_page(*size)
-    document.save(file)
+    file = BytesIO()
+    with closing(PdfDocument.new()) as document:
+        for size in sizes:
+            document.new_page(*size)
+        document.save(file)
     return file.getvalue()
 
 

@@ -1,6 +1,7 @@
 """Draw a page of a PDF."""
 
 import math
+from contextlib import closing
 
 from PIL import Image
 from pypdfium2 import PdfDocument, PdfiumError
@@ -17,18 +18,22 @@ _MAX_SIDE_PX = 8000.0
 def drawn_page(content: bytes, number: int) -> tuple[Image.Image, int]:
     """Return a page, counted from 1, at 200 dots per inch or fewer, and the number of pages. Raises RefusedError."""
     try:
-        document = PdfDocument(content)
-        pages = len(document)
-        if not 1 <= number <= pages:
-            raise RefusedError(
-                say("pdf_pages", "the PDF has {pages} pages, and page {page} was asked for", pages=pages, page=number)
-            )
-        page = document[number - 1]
-        return page.render(scale=_scale_of(*page.get_size())).to_pil().convert("RGB"), pages
+        with closing(PdfDocument(content)) as document:
+            return _drawn(document, number), len(document)
     except PdfiumError as error:
         if error.err_code == FPDF_ERR_PASSWORD:
             raise RefusedError(say("pdf_encrypted", "the PDF is encrypted. Save it without a password")) from error
         raise RefusedError(say("pdf_damaged", "the PDF is damaged")) from error
+
+
+def _drawn(document: PdfDocument, number: int) -> Image.Image:
+    pages = len(document)
+    if not 1 <= number <= pages:
+        raise RefusedError(
+            say("pdf_pages", "the PDF has {pages} pages, and page {page} was asked for", pages=pages, page=number)
+        )
+    page = document[number - 1]
+    return page.render(scale=_scale_of(*page.get_size())).to_pil().convert("RGB")
 
 
 def _scale_of(width_pt: float, height_pt: float) -> float:
