@@ -6,9 +6,14 @@ import pytest
 from dropanchor_schemas import StartPose, TagSettings
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.belief.births.heading_classes import may_have_own_error
-from dropanchor_service.estimation.fleet.belief.heading_models import SOFT_IRON_FACTOR, reference_error
+from dropanchor_service.estimation.fleet.belief.heading_models import (
+    REFERENCE_STD,
+    SOFT_IRON_FACTOR,
+    reference_error,
+    reference_std,
+)
 from dropanchor_service.estimation.fleet.belief.layout import MAGNETOMETER_MODEL, PLATFORM_MODEL
-from dropanchor_service.estimation.fleet.belief.start import REFERENCE_STD, choose_model
+from dropanchor_service.estimation.fleet.belief.start import choose_model
 from dropanchor_service.estimation.fleet.configure import (
     MOUNT_UNKNOWN_STD,
     SLIP_KNOWN_STD,
@@ -97,7 +102,7 @@ def test_with_the_imu_as_the_source_the_setting_is_the_error_of_north(given: flo
     assert reference_error(rows[0], 0.04)[1] == pytest.approx(slow)
     assert may_start_with_own_error(rows[0]) == (given is None)
     assert rows["heading"]["north"][0] == pytest.approx(0.2 if given is None else 0.0)
-    assert rows["settings"]["reference_std"][0] == (REFERENCE_STD if given is None else given)
+    assert reference_std(rows[0]) == (REFERENCE_STD if given is None else given)
 
 
 @pytest.mark.parametrize(
@@ -115,7 +120,16 @@ def test_the_error_of_the_sites_declination_is_one_of_magnetic_headings(
     node = np.zeros(1, NODE)
     node["heading_kind"] = kind
     choose_model(row[0], node[0], Tuning())
-    assert row["settings"]["reference_std"][0] == pytest.approx(std)
+    assert reference_std(row[0]) == pytest.approx(std)
+
+
+def test_a_magnetometer_needs_the_declination_also_after_a_platform_has_told_the_heading() -> None:
+    row = configure_row(tag_columns(TagSettings(), 0.5, 0.24), Tuning()).reshape(1)
+    for kind in (DERIVED_HEADING, ABSOLUTE_HEADING):
+        node = np.zeros(1, NODE)
+        node["heading_kind"] = kind
+        choose_model(row[0], node[0], Tuning())
+    assert reference_std(row[0]) == pytest.approx(0.26)
 
 
 @pytest.mark.parametrize(("heading", "times"), [(0.5, SOFT_IRON_FACTOR), (None, 1.0)])

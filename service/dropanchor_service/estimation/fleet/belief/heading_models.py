@@ -24,6 +24,7 @@ from dropanchor_service.estimation.fleet.frontend.node import RESTING, Node
 from dropanchor_service.estimation.fleet.frontend.standstill import BIAS_SD
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
+REFERENCE_STD = 0.1  # rad, constant error of a heading reference, beside that of the declination
 SOFT_IRON_FACTOR = 3.0  # times the claimed error of a magnetometer
 SWITCH_LOG_RATIO = 10.0  # log likelihood by which another model must win
 BIAS_WALK = 1e-5  # (rad/s)^2/s, of the gyroscope's bias in these models
@@ -80,6 +81,17 @@ def is_heading_std_given(row: Row) -> bool:
     if row.heading.model == MAGNETOMETER_MODEL:
         return is_north_given(row)
     return math.isfinite(row.settings.heading_std)
+
+
+@njit(cache=True, nogil=True)
+def reference_std(row: Row) -> float:
+    """Return the standard deviation of the constant error of the heading reference in use, rad.
+
+    That of a magnetometer has the error of the site's declination in it.
+    """
+    if is_heading_std_given(row):
+        return float(row.settings.heading_std)
+    return float(row.settings.reference_std) if row.heading.model == MAGNETOMETER_MODEL else REFERENCE_STD
 
 
 @njit(nogil=True)

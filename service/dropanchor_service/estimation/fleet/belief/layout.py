@@ -60,7 +60,7 @@ SETTINGS: Final = np.dtype(
         ("range_scale", np.float64),  # measured = scale * distance + bias
         ("range_bias", np.float64),  # m
         ("range_bias_std", np.float64),
-        ("reference_std", np.float64),  # rad, constant error of the heading reference
+        ("reference_std", np.float64),  # rad, constant error of north, with that of the declination
         ("gyro_bias_std", np.float64),  # rad/s, residual bias of the yaw increments
         ("speed_max", np.float64),  # m/s
         ("reverse_allowed", np.uint8),

@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from dropanchor_service.estimation.fleet.angles import wrap
-from dropanchor_service.estimation.fleet.belief.heading_models import is_heading_std_given, is_north_given
+from dropanchor_service.estimation.fleet.belief.heading_models import is_north_given
 from dropanchor_service.estimation.fleet.belief.layout import MAGNETOMETER_MODEL, PLATFORM_MODEL, Anchor, Row
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import (
@@ -17,7 +17,6 @@ from dropanchor_service.estimation.fleet.frontend.node import (
 from dropanchor_service.estimation.fleet.measurement.height import offset_of
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-REFERENCE_STD: Final = 0.1  # rad, constant error of a heading reference, beside that of the declination
 ADOPT_VAR: Final = 0.04  # rad^2, of north below which poses are in the site frame
 
 
@@ -57,10 +56,6 @@ def choose_model(row: Row, node: Node, t: Tuning) -> None:
         row.heading.model = MAGNETOMETER_MODEL
         if row.start.known == 1 and math.isfinite(row.start.heading) and not is_north_given(row):
             row.heading.north = wrap(node.heading - row.start.heading)
-    if is_in_site_frame(node.heading_kind) and is_heading_std_given(row):
-        settings.reference_std = settings.heading_std
-    elif is_in_site_frame(node.heading_kind) and node.heading_kind != ABSOLUTE_HEADING:
-        settings.reference_std = REFERENCE_STD
     if node.heading_kind == DERIVED_HEADING:
         row.heading.model = PLATFORM_MODEL
         settings.mount_angle_std = min(settings.mount_angle_std, t.mount_known_std)

@@ -3,6 +3,7 @@
 import math
 
 from dropanchor_service.estimation.fleet.angles import wrap
+from dropanchor_service.estimation.fleet.belief.heading_models import reference_std
 from dropanchor_service.estimation.fleet.belief.layout import (
     CLASSES,
     FAMILIES,
@@ -78,7 +79,7 @@ def add_reference_variance(cov: Floats, x: float, y: float, variance: float) -> 
 def widen_by_reference(row: Row, scratch: Scratch) -> None:
     """Widen an ellipse of the site frame whose start was found: it is known only as well as the heading reference."""
     if row.start.known == 0 and row.heading.in_site_frame == 1:
-        variance = row.settings.reference_std**2
+        variance = reference_std(row) ** 2
         add_reference_variance(scratch.cov, scratch.mean[0], scratch.mean[1], variance)
         turn_causes(scratch, variance)
 

@@ -17,6 +17,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array, Frame, State
+from dropanchor_service.estimation.fleet.belief.heading_models import reference_std
 from dropanchor_service.estimation.fleet.belief.summary import add_reference_variance
 from dropanchor_service.estimation.fleet.frontend.node import RANGE
 from dropanchor_service.estimation.fleet.outputs import poses_of
@@ -88,7 +89,7 @@ def _put(poses: Array, points: Array, covs: Array, now: Array, anchors: Array) -
     good = np.isfinite(points).all(axis=1) & np.isfinite(covs).all(axis=(1, 2)) & np.isfinite(poses["x"])
     for k in np.flatnonzero(good & (poses["frame"] == Frame.SITE)):
         if now["start"]["known"] == 0:
-            add_reference_variance(covs[k], points[k, 0], points[k, 1], float(now["settings"]["reference_std"]) ** 2)
+            add_reference_variance(covs[k], points[k, 0], points[k, 1], reference_std(now) ** 2)
     anchor = anchors[now["anchor"]]
     points[:, 0] += anchor["x"]
     points[:, 1] += anchor["y"]
