@@ -38,7 +38,8 @@ class SummaryTable:
         """Delete the summaries of the stretches that contain these slots, to which poses are added."""
         touched = [np.unique(slots // length).tolist() for length in SLOTS]
         for level, stretches in enumerate(touched):
-            stored.delete_stretches(level, stretches)
+            if written := [stretch for stretch in stretches if stretch not in self._missing[level]]:
+                stored.delete_stretches(level, written)
             self._missing[level].update(stretches)
         self._newest = max(self._newest, *touched[FINE])
         self._resting = self._missing[FINE].difference(touched[FINE], (self._newest,))
@@ -49,33 +50,40 @@ class SummaryTable:
         self._resting &= self._missing[FINE]
 
     def write_next(self, stored: WritableTracks) -> bool:
-        """Write the newest missing summary of a stretch that rests, and return whether there was one.
+        """Write the newest missing summary of a stretch that rests, and return whether there was one; see `next`."""
+        if (found := self.next()) is None:
+            return False
+        self.write(stored, *found)
+        return True
 
-        After it returned False, every stretch but the newest rests that no further poses are added to.
+    def next(self) -> tuple[int, int] | None:
+        """Return level and stretch of the newest missing summary of a stretch that rests; None if there is none.
+
+        After it returned None, every stretch but the newest rests that no further poses are added to.
         """
         if self._resting:
-            stretch = max(self._resting)
-            self._write(stored, FINE, stretch, *_of_poses(stored, stretch))
-            self._resting.discard(stretch)
-            return True
+            return FINE, max(self._resting)
         for level in (COARSE, DAY):
             whole = {stretch for stretch in self._missing[level] if self._is_whole(level, stretch)}
             if whole:
-                self._write(stored, level, max(whole), *_of_finer(stored, level, max(whole)))
-                return True
+                return level, max(whole)
         self._resting = self._missing[FINE] - {self._newest}
-        return False
+        return None
+
+    def write(self, stored: WritableTracks, level: int, stretch: int) -> None:
+        """Write the summary that `next` has returned."""
+        summaries, heat = _of_poses(stored, stretch) if level == FINE else _of_finer(stored, level, stretch)
+        blob = None if level == DAY else summaries.tobytes()
+        stored.put_stretch(level, stretch, blob, heat.heads.tobytes(), heat.cells.tobytes())
+        self._missing[level].discard(stretch)
+        if level == FINE:
+            self._resting.discard(stretch)
 
     def _is_whole(self, level: int, stretch: int) -> bool:
         """Return whether the stretch is over, and no summary of the finer level is missing in it."""
         finer = _finer(level, stretch)
         is_over = (stretch + 1) * SLOTS[level] <= self._newest * SLOTS[FINE]
         return is_over and self._missing[level - 1].isdisjoint(finer)
-
-    def _write(self, stored: WritableTracks, level: int, stretch: int, summaries: Array, heat: Heat) -> None:
-        blob = None if level == DAY else summaries.tobytes()
-        stored.put_stretch(level, stretch, blob, heat.heads.tobytes(), heat.cells.tobytes())
-        self._missing[level].discard(stretch)
 
 
 def _of_poses(stored: WritableTracks, fine: int) -> tuple[Array, Heat]:

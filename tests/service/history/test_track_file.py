@@ -171,6 +171,43 @@ def test_a_failed_insert_leaves_nothing_behind(tmp_path: Path, connections: list
     writer.close()
 
 
+def test_a_summary_ends_with_new_poses_also_after_an_insert_that_failed(
+    tmp_path: Path, connections: list[sqlite3.Connection]
+) -> None:
+    writer = TrackWriter(tmp_path / "h.sqlite")
+    (writing,) = connections
+    writer.insert(poses(*range(0, 300, 5)), ["a"] * 60, [None] * 60)
+    assert not writer.summarise()  # from now on, what is over rests
+    while writer.summarise():
+        pass
+    count = "SELECT count(*) FROM summaries WHERE level = 0"
+    assert writing.execute(count).fetchone() == (2,)
+    writing.execute(f"PRAGMA max_page_count = {writer.used_bytes() // 4096 + 3}")
+    with pytest.raises(sqlite3.OperationalError, match="full"):
+        writer.insert(poses(*np.arange(1, 100, 0.01)), ["a"] * 9900, [None] * 9900)
+    assert writing.execute(count).fetchone() == (2,)
+    writing.execute("PRAGMA max_page_count = 1000000")
+    writer.insert(poses(1), ["a"], [None])
+    assert writing.execute(count).fetchone() == (1,)
+    writer.close()
+
+
+def test_a_write_begins_no_transaction_and_deletes_no_summary_for_nothing(
+    tmp_path: Path, connections: list[sqlite3.Connection]
+) -> None:
+    writer = TrackWriter(tmp_path / "h.sqlite")
+    (writing,) = connections
+    writer.insert(poses(0), ["a"], [None])
+    while writer.summarise():
+        pass
+    statements: list[str] = []
+    writing.set_trace_callback(statements.append)
+    writer.insert(poses(1), ["a"], [None])
+    assert not writer.summarise()
+    assert [statement.split()[0] for statement in statements] == ["BEGIN", "INSERT", "INSERT", "COMMIT"]
+    writer.close()
+
+
 @pytest.mark.parametrize("content", [b"this is not a database, " * 100, None])
 def test_a_file_of_another_kind_or_version_is_not_changed(tmp_path: Path, content: bytes | None) -> None:
     path = tmp_path / "h.sqlite"

@@ -52,6 +52,9 @@ _UPGRADES = {  # from each version
     2: f"DROP TABLE summaries; {_AGAIN}",
     3: f"DROP TABLE summaries; DROP TABLE heat; {_AGAIN}",
 }
+_USED = """
+SELECT (page_count - freelist_count) * page_size FROM pragma_page_count, pragma_freelist_count, pragma_page_size
+"""
 
 
 class TrackFileError(sqlite3.Error):
@@ -67,7 +70,7 @@ class TrackWriter:
         try:
             self._prepare()
             self._rows = SqliteRows(self._connection)
-            self._summaries = SummaryTable(self._rows)
+            self._known_summaries: SummaryTable | None = SummaryTable(self._rows)
         except sqlite3.Error:
             self._connection.close()
             raise
@@ -90,7 +93,7 @@ class TrackWriter:
                 "INSERT OR IGNORE INTO slots VALUES (?)", [(slot,) for slot in np.unique(slots).tolist()]
             )
             blobs = records_of(poses[order], anchor_ids[order])
-            self._summaries.delete(self._rows, slots)
+            self._summaries().delete(self._rows, slots)
             self._insert(slots.tolist(), tag_ids[order].tolist(), poses["t_ns"][order].tolist(), blobs)
 
     def prune(self, keep_from_ns: int, max_bytes: int) -> int:
@@ -106,21 +109,26 @@ class TrackWriter:
             self._connection.execute("DELETE FROM slots WHERE slot <= ?", (oldest,))
             for level, length in enumerate(SLOTS):  # the stretches that ended with this slot or before
                 self._rows.delete_stretches_before(level, (oldest + 1) // length)
-                self._summaries.forget(level, (oldest + 1) // length)
+                self._summaries().forget(level, (oldest + 1) // length)
         return 1
 
     def summarise(self) -> bool:
         """Write one missing summary, the newest first. Return whether there was one to write."""
+        found = self._summaries().next()
+        if found is None:  # as nearly always: then a transaction would be most of the cost of a write
+            return False
         with self._transaction():
-            return self._summaries.write_next(self._rows)
+            self._summaries().write(self._rows, *found)
+        return True
 
     def used_bytes(self) -> int:
         """Return the size of the file without its free pages."""
-        pages, free, size = (
-            self._connection.execute(f"PRAGMA {name}").fetchone()[0]
-            for name in ("page_count", "freelist_count", "page_size")
-        )
-        return int((pages - free) * size)
+        return int(self._connection.execute(_USED).fetchone()[0])
+
+    def _summaries(self) -> SummaryTable:
+        if self._known_summaries is None:
+            self._known_summaries = SummaryTable(self._rows)
+        return self._known_summaries
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
@@ -130,6 +138,7 @@ class TrackWriter:
             self._connection.execute("COMMIT")
         except BaseException:
             self._ids.clear()  # some ids may belong to this transaction
+            self._known_summaries = None  # and so may deletions
             if self._connection.in_transaction:  # a full disk may have ended the transaction already
                 self._connection.execute("ROLLBACK")
             raise
