@@ -1,7 +1,6 @@
 """Track each publisher of a tag: which of its messages have arrived, in which order, and its clock."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,8 +20,7 @@ WATCH_NS = 5_000_000_000  # time between two searches for tags with two publishe
 _NONE = np.zeros(0, np.int64)
 
 
-@dataclass(frozen=True)
-class Sequenced:
+class Sequenced(NamedTuple):
     """The result of `Publishers.sequence`, as indices of messages.
 
     due: to fuse now, in this order. pending: to pass in again, before newer messages, until they are due. duplicates:

@@ -1,14 +1,15 @@
 """Turn messages of admitted tags into samples for an engine: decode, put in order, screen, map clocks."""
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from operator import is_
 
 import numpy as np
 
 from dropanchor_schemas.kinds import PRESSURE, SCALARS, Kind, RangeSample
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array, SampleBatch
-from dropanchor_service.ingest.backlog import Message
+from dropanchor_service.ingest.backlog import ARRIVAL, Message
 from dropanchor_service.ingest.batch import Batch, Spans, engine_columns, spans_of, times_of
 from dropanchor_service.ingest.decode import Forms, read_forms, read_samples
 from dropanchor_service.ingest.due import due_of_each
@@ -125,7 +126,7 @@ class SampleReader:
         """
         for due in _one_per_row(ordered.sequenced.due, ordered.messages.rows):
             sent = read_samples(ordered.messages.read, due)
-            batch = Batch(ordered.messages, replace(ordered.sequenced, due=due), sent, [])
+            batch = Batch(ordered.messages, ordered.sequenced._replace(due=due), sent, [])
             yield self._of_engine(self._on_one_clock(self._screened(batch)))
 
     def _screened(self, batch: Batch) -> Batch:
@@ -179,7 +180,7 @@ class SampleReader:
         """
         if self._reorder.is_full:
             return now_ns
-        return min(now_ns, max((message[3] for message in fresh), default=now_ns)) - self.window_ns
+        return min(now_ns, max(map(ARRIVAL, fresh), default=now_ns)) - self.window_ns
 
     def _forms(self, payloads: Sequence[bytes], encodings: Sequence[str]) -> Forms:
         """Return the forms of these payloads. A payload that makes the decoder fail is read as an empty one."""
@@ -241,6 +242,8 @@ class SampleReader:
             self._of_known_anchors(batch, column, kind) if kind.has_anchor else column
             for kind, column in zip(SCALARS, scalars, strict=True)
         ]
+        if all(map(is_, known, scalars)):
+            return batch
         return batch._replace(samples=batch.samples.with_columns([imu, *known]))
 
     def _of_known_anchors(self, batch: Batch, samples: Array, kind: Kind) -> Array:
@@ -251,6 +254,9 @@ class SampleReader:
             self._note_unknown_anchors(batch, samples[indices < 0])
             indices = self._indices(batch, samples)
         unknown = indices < 0
+        if not unknown.any():
+            samples["anchor"] = indices
+            return samples
         kept = keep(samples, unknown, Reason.ANCHOR_UNKNOWN, kind.name, batch.rejected)
         kept["anchor"] = indices[~unknown]
         return kept
@@ -267,5 +273,8 @@ def _if_readable(payload: bytes, encoding: str) -> bytes:
 
 def _one_per_row(due: Array, of_row: Array) -> list[Array]:
     """Split the indices `due` into parts that hold each row at most once, in the order of each row."""
-    ranks = rank_in_row(of_row[due])
+    rows = of_row[due]
+    if len(set(rows.tolist())) == len(rows):  # as nearly always
+        return [due] if len(due) else []
+    ranks = rank_in_row(rows)
     return [due[ranks == rank] for rank in range(int(ranks.max(initial=-1)) + 1)]

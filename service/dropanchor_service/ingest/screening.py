@@ -39,7 +39,7 @@ def screen(decoded: Decoded) -> tuple[Decoded, list[Rejected]]:
     columns = [_screened_imu(imu, rejected)]
     for kind, reasons, column in zip(SCALARS, _OF_SCALARS, scalars, strict=True):
         columns.append(_screened(column, (*kind.limits, *kind.second_limits), reasons, kind.name, rejected))
-    return decoded.with_columns(columns), rejected
+    return (decoded.with_columns(columns) if rejected else decoded), rejected
 
 
 def absurd_imu(imu: Array) -> tuple[Array, Array]:

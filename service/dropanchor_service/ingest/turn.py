@@ -12,7 +12,7 @@ from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array, PoseBatch, SampleBatch
 from dropanchor_service.ingest.admission import Admission
-from dropanchor_service.ingest.backlog import Message
+from dropanchor_service.ingest.backlog import ROW, Message
 from dropanchor_service.ingest.buffer import MessageBuffer, UnregisteredMessage
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.health import HealthIntake
@@ -110,7 +110,7 @@ class Ingest:
         if messages:
             self._notify(self._observers.messages, messages)
             self._metrics.messages.inc(len(messages))
-            self._rows.count_messages(np.array([message[0] for message in messages], np.int32), messages[-1][3])
+            self._rows.count_messages(np.fromiter(map(ROW, messages), np.int32, len(messages)), messages[-1][3])
 
     def _admit_announced(self) -> None:
         while self._announced:

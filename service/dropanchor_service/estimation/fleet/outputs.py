@@ -73,9 +73,12 @@ def skipped_of(imu: Array, verdicts: Array) -> dict[str, Array]:
 
 def doubted_of(events: Array, order: Array, imu: int) -> dict[str, Array]:
     """Return the row of each pressure that is in doubt, under the reason of its rejection. order: as of `Due`."""
-    taken = events[order[order >= imu] - imu]
-    doubted = (taken["kind"] == PRESSURE_EVENT) & (taken["anchor"] == DOUBTED)
-    return {"pressure_doubted": taken["row"][doubted]} if doubted.any() else {}
+    taken = order[order >= imu] - imu
+    pressures = taken[events["kind"][taken] == PRESSURE_EVENT]
+    if not len(pressures):
+        return {}
+    doubted = pressures[events["anchor"][pressures] == DOUBTED]
+    return {"pressure_doubted": events["row"][doubted]} if len(doubted) else {}
 
 
 def with_rows(by_kind: dict[str, Array], kind: str, rejected: dict[str, Array]) -> dict[str, Array]:
@@ -87,7 +90,10 @@ def with_rows(by_kind: dict[str, Array], kind: str, rejected: dict[str, Array]) 
 
 def modes_of(nodes: Array, beliefs: Array, rows: Array, pool: Array, anchors: Array, workspace: Array) -> Array:
     """Return HYPOTHESIS: the modes of each row that its last node left ambiguous. A row's nodes are together."""
-    modes = np.zeros(MODES * _count_ambiguous(nodes, beliefs), HYPOTHESIS)
+    ambiguous = _count_ambiguous(nodes, beliefs)
+    modes = np.zeros(MODES * ambiguous, HYPOTHESIS)
+    if not ambiguous:
+        return modes
     return modes[: _write_modes(nodes, beliefs, rows, pool, anchors, workspace, modes)]
 
 

@@ -19,6 +19,7 @@ from dropanchor_service.estimation.fleet.frontend.sorting import REJECTED, TOUCH
 
 NEVER: Final = np.iinfo(np.int64).min // 2
 FIRST_CAPACITY: Final = 64
+_REASON_OF: Final = {code: reason for reason, code in REASONS.items()}
 
 
 class Due(NamedTuple):
@@ -96,10 +97,8 @@ class SampleQueue:
         if ordered == NONE:
             raise IndexError("a sample belongs to a row that is not configured: call configure for it first")
         rejected = self._batch.rejected[: self._batch.counts[REJECTED]]
-        by_reason = _rows_by(rejected, "reason", {code: reason for reason, code in REASONS.items()})
-        return Due(
-            self._batch.events, self._batch.order[:ordered], by_reason, _rows_by(rejected, "kind", KINDS), self._lags()
-        )
+        by_reason, by_kind = _rows_by(rejected, "reason", _REASON_OF), _rows_by(rejected, "kind", KINDS)
+        return Due(self._batch.events, self._batch.order[:ordered], by_reason, by_kind, self._lags())
 
     def _lags(self) -> Array:
         """Return LAG of the rows of the batch."""
