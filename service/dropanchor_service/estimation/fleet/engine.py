@@ -95,8 +95,7 @@ class FleetEngine:
         due = self._queue.due(samples, len(self._anchors))
         if not len(due.order):
             return PoseBatch(rejected=due.rejected, unused=due.unused, lags=due.lags)
-        if self._referring:
-            share_references(self._heights, np.fromiter(self._referring, np.int64))
+        share_references(self._heights, np.fromiter(self._referring, np.int64))
         self._pool = fitted(self._pool, self._rows[: self._configured], MAX_HYPOTHESES, self._lanes.count)
         verdicts = np.zeros(len(samples.imu), np.uint8)
         cuts = self._lanes.cut(due.order, samples.imu["row"], due.events["row"])

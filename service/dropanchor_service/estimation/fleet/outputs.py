@@ -90,10 +90,7 @@ def with_rows(by_kind: dict[str, Array], kind: str, rejected: dict[str, Array]) 
 
 def modes_of(nodes: Array, beliefs: Array, rows: Array, pool: Array, anchors: Array, workspace: Array) -> Array:
     """Return HYPOTHESIS: the modes of each row that its last node left ambiguous. A row's nodes are together."""
-    ambiguous = _count_ambiguous(nodes, beliefs)
-    modes = np.zeros(MODES * ambiguous, HYPOTHESIS)
-    if not ambiguous:
-        return modes
+    modes = np.zeros(MODES * _count_ambiguous(nodes, beliefs), HYPOTHESIS)
     return modes[: _write_modes(nodes, beliefs, rows, pool, anchors, workspace, modes)]
 
 
