@@ -33,7 +33,8 @@ def _drawn(document: PdfDocument, number: int) -> Image.Image:
             say("pdf_pages", "the PDF has {pages} pages, and page {page} was asked for", pages=pages, page=number)
         )
     page = document[number - 1]
-    return page.render(scale=_scale_of(*page.get_size())).to_pil().convert("RGB")
+    image: Image.Image = page.render(scale=_scale_of(*page.get_size())).to_pil()
+    return image.convert("RGB")
 
 
 def _scale_of(width_pt: float, height_pt: float) -> float:
