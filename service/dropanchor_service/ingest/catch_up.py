@@ -189,11 +189,16 @@ class CatchUp:
     def _may_wait(self, key: str, unheard: set[int]) -> bool:
         """Return whether the caches may be asked again, if some of them have not answered.
 
-        A tag without caches must not wait for an answer longer than for messages out of order.
+        At its first gap nobody knows whether a tag has caches: its router may not have announced them again yet. One
+        that has none waits in vain then, and never again until it announces itself anew.
         """
+        may_retry = self._retries[key] < MAX_RETRIES
         if any(self._gaps.has_cache(key, boot_id) for boot_id in unheard):
-            return self._retries[key] < MAX_RETRIES or self._now_s() - self._asked_s[key] < PATIENCE_S
-        return self._retries[key] < MAX_RETRIES and not (unheard and key in self._with_gap)
+            return may_retry or self._has_time(key)
+        return may_retry and (not unheard or key not in self._with_gap or self._has_time(key))
+
+    def _has_time(self, key: str) -> bool:
+        return self._now_s() - self._asked_s[key] < PATIENCE_S
 
     def _unheard(self, key: str) -> set[int]:
         """Return the boot ids of known publishers with a missing message whose caches have not answered.
@@ -207,7 +212,8 @@ class CatchUp:
         return {
             boot_id
             for boot_id in missing - answered
-            if not self._cached[key] or key in self._with_gap or self._gaps.has_cache(key, boot_id)
+            if not self._gaps.lacks_cache(key, boot_id)
+            and (not self._cached[key] or key in self._with_gap or self._gaps.has_cache(key, boot_id))
         }
 
     def _distances(self, key: str) -> dict[int, set[int]]:

@@ -51,6 +51,11 @@ class Gaps:
         known = self._tags.get(key, {}).get(boot_id)
         return known is not None and known.has_cache is True
 
+    def lacks_cache(self, key: str, boot_id: int) -> bool:
+        """Return whether the cache of this publisher did not answer when it was last asked."""
+        known = self._tags.get(key, {}).get(boot_id)
+        return known is not None and known.has_cache is False
+
     def on_asked(self, key: str, newest: Number) -> None:
         """Note that the caches were asked for all messages before this one."""
         publisher = self._publisher(key, newest.boot_id)
