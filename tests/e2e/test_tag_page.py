@@ -59,14 +59,14 @@ def test_a_phone_that_opens_the_link_of_its_key_has_a_pose(tmp_path: Path, capsy
         with tag_page(chromium, link, ignore_https_errors=True) as page, ranges_from_elsewhere(service, gateway):
             page.start()
             page.move(shake=0.8)
+            # A phone that only trembles does not tell whether it moves: some seconds later its place is in doubt.
             page.wait_for("document.getElementById('state').textContent === 'Tracking'")
-            page.wait_for("counts.sent > 600")
             pose = service.ask("GET", "/api/v1/tags/anna/pose", headers={"authorization": f"Bearer {reader}"}).json()
+            page.wait_for("counts.sent > 600")
             assert page.errors == []
             page.page.screenshot(path=tmp_path / "tracking.png")
         assert service.stop() == 0
-    assert pose["state"] in ("tracking", "ambiguous")  # a phone that only trembles does not tell whether it moves
-    assert pose["anchor"] == "7"
+    assert (pose["state"], pose["anchor"]) == ("tracking", "7")
     assert math.hypot(pose["x"], pose["y"]) == pytest.approx(pose["range_m"], abs=2.0)
     assert math.remainder(pose["heading_rad"] - math.pi / 2, math.tau) == pytest.approx(0.0, abs=0.6)
     log = "".join(service.log)

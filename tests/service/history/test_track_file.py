@@ -1,7 +1,8 @@
 """The history's file stores poses, prunes them and survives failed writes and kills."""
 
 import sqlite3
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -156,16 +157,23 @@ def test_the_oldest_poses_are_pruned_first_by_age_and_by_size(tmp_path: Path) ->
     writer.close()
 
 
+@contextmanager
+def on_full_disk(writing: sqlite3.Connection, writer: TrackWriter) -> Iterator[None]:
+    """Let the file grow by three pages at most while the block runs, which has to fail."""
+    writing.execute(f"PRAGMA max_page_count = {writer.used_bytes() // 4096 + 3}")
+    with pytest.raises(sqlite3.OperationalError, match="full"):
+        yield
+    writing.execute("PRAGMA max_page_count = 1000000")
+
+
 def test_a_failed_insert_leaves_nothing_behind(tmp_path: Path, connections: list[sqlite3.Connection]) -> None:
     writer, reader = TrackWriter(tmp_path / "h.sqlite"), FileReader(tmp_path / "h.sqlite")
     (writing,) = connections
     writer.insert(poses(0), ["a"], [None])
-    writing.execute(f"PRAGMA max_page_count = {writer.used_bytes() // 4096 + 3}")
     many = poses(*range(1, 5001))
-    with pytest.raises(sqlite3.OperationalError, match="full"):
+    with on_full_disk(writing, writer):
         writer.insert(many, ["new"] * 5000, ["7"] * 5000)
     assert not reader.has_tag("new")
-    writing.execute("PRAGMA max_page_count = 1000000")
     writer.insert(many, ["new"] * 5000, ["7"] * 5000)
     assert len(times(reader, "new", limit=9999)) == 5000
     writer.close()
@@ -182,11 +190,9 @@ def test_a_summary_ends_with_new_poses_also_after_an_insert_that_failed(
         pass
     count = "SELECT count(*) FROM summaries WHERE level = 0"
     assert writing.execute(count).fetchone() == (2,)
-    writing.execute(f"PRAGMA max_page_count = {writer.used_bytes() // 4096 + 3}")
-    with pytest.raises(sqlite3.OperationalError, match="full"):
+    with on_full_disk(writing, writer):
         writer.insert(poses(*np.arange(1, 100, 0.01)), ["a"] * 9900, [None] * 9900)
     assert writing.execute(count).fetchone() == (2,)
-    writing.execute("PRAGMA max_page_count = 1000000")
     writer.insert(poses(1), ["a"], [None])
     assert writing.execute(count).fetchone() == (1,)
     writer.close()
