@@ -10,7 +10,7 @@ from typing import Any
 import promql_parser as promql
 import pytest
 import yaml
-from prometheus_client import CollectorRegistry, generate_latest
+from prometheus_client import CollectorRegistry, Metric, generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
 from dropanchor_service.metrics.cluster import ClusterGauges
@@ -37,16 +37,22 @@ def expressions() -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set[str]]]:
-    """Return what a running service exposes, and one in a cluster: metric → label → values."""
+def families(tmp_path_factory: pytest.TempPathFactory) -> list[Metric]:
+    """Return what a service exposes that nothing has happened to, and one in a cluster."""
     folder = tmp_path_factory.mktemp("data")
     with running_service("--engine", "paper", "--data-dir", str(folder)) as service:
         text = service.ask("GET", "/metrics").text
     of_cluster = CollectorRegistry()
     of_cluster.register(ClusterGauges("yard", lambda: (1, 0.0)))
     text += generate_latest(of_cluster).decode()
+    return list(text_string_to_metric_families(text))
+
+
+@pytest.fixture(scope="module")
+def exposed(families: list[Metric]) -> dict[str, dict[str, set[str]]]:
+    """Return the values of labels: metric → label → values."""
     found: dict[str, dict[str, set[str]]] = {}
-    for family in text_string_to_metric_families(text):
+    for family in families:
         for sample in family.samples:
             labels = found.setdefault(sample.name, {})
             for label, value in sample.labels.items():
@@ -69,8 +75,20 @@ def test_every_metric_and_label_in_an_expression_exists(
                 continue
             values = exposed[selector.name][matcher.name]
             assert set(re.split(r"\|", matcher.value)) <= values
+    names = [selector.name for selector in selectors(promql.parse(expression))]
     for label in re.findall(r"\bby \((\w+)\)", expression):
-        assert label in known_labels(expression, exposed)
+        assert label in {known for name in names for known in exposed[name]}
+
+
+@pytest.mark.parametrize("rule", rules(), ids=lambda rule: rule["alert"])
+def test_the_counters_of_an_alert_begin_at_zero_so_that_their_first_count_is_an_increase(
+    rule: Any, families: list[Metric]
+) -> None:
+    for selector in selectors(promql.parse(rule["expr"])):
+        if selector.name.endswith(("_total", "_bucket")):
+            values = [one.value for family in families for one in family.samples if one.name == selector.name]
+            assert values, f"{selector.name} has no series before its first count"
+            assert set(values) == {0.0}
 
 
 def test_the_check_fails_for_a_metric_that_does_not_exist(exposed: dict[str, dict[str, set[str]]]) -> None:
@@ -158,13 +176,6 @@ def test_grafana_finds_the_board_and_the_data_source_where_compose_mounts_them()
     assert (DEPLOY / mounts[provider["options"]["path"]] / "dropanchor.json").is_file()
     source = yaml.safe_load((DEPLOY / "grafana/provisioning/datasources/prometheus.yaml").read_text())["datasources"][0]
     assert {panel["datasource"]["uid"] for panel in board()["panels"]} == {source["uid"]}
-
-
-def known_labels(expression: str, exposed: dict[str, dict[str, set[str]]]) -> set[str]:
-    """Return the labels of the metrics in an expression, also of counters that have not counted yet."""
-    declared = {"dropanchor_faults_total": {"where"}}
-    names = [selector.name for selector in selectors(promql.parse(expression))]
-    return {label for name in names for label in (*exposed.get(name, ()), *declared.get(name, ()))}
 
 
 def selectors(node: Any) -> Iterator[Any]:

@@ -116,6 +116,10 @@ class IngestBench:
         """Return the rejections by reason, without zeros."""
         return {s.labels["reason"]: s.value for s in _totals(self.metrics.rejected) if s.value}
 
+    def faults(self) -> dict[str, float]:
+        """Return the internal errors by place, without zeros."""
+        return {where: value for where, fault in self.metrics.faults.items() if (value := self.total(fault))}
+
     def total(self, counter: Counter, **labels: str) -> float:
         """Return the sum of a counter over all of its labels, or over these."""
         return sum(s.value for s in _totals(counter) if labels.items() <= s.labels.items())

@@ -235,7 +235,7 @@ class GuardedEngine:
         yield poses
 
     def _fault(self, row: int, samples: SampleBatch, error: Exception, now_ns: int) -> PoseBatch:
-        self._metrics.faults.labels("estimator").inc()
+        self._metrics.faults["estimator"].inc()
         self._log.exception(f"estimator of tag {self._sites.rows.at(row).name}", error)
         times = self._faults.get(row, _Faults(0, 0)).times + 1
         quarantine = times % FAULTS_BEFORE_QUARANTINE == 0

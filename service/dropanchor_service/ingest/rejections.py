@@ -60,10 +60,10 @@ class Rejections:
 
     def observer_failed(self, error: Exception) -> None:
         """Count and log an error in an observer."""
-        self._metrics.faults.labels("observer").inc()
+        self._metrics.faults["observer"].inc()
         self._log.exception("observer", error)
 
     def decoder_failed(self, error: Exception) -> None:
         """Count and log an error in the decoder."""
-        self._metrics.faults.labels("decoder").inc()
+        self._metrics.faults["decoder"].inc()
         self._log.exception("decoder", error)

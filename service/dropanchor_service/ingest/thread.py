@@ -85,7 +85,7 @@ class IngestThread(Worker):
                 self._adapt(taken / (time.monotonic() - self._turned_s))
             self._between_turns()
         except Exception as error:
-            self._metrics.faults.labels("ingest").inc()
+            self._metrics.faults["ingest"].inc()
             self._log.exception("ingest", error)
             self._stop.wait(self._period.current_s)
 

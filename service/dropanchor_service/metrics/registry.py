@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from functools import partial
+from typing import Literal, get_args
 
 import numpy as np
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
@@ -14,6 +15,8 @@ from dropanchor_service.answers.frames import STATES, published_states
 from dropanchor_service.store.latest_poses import LatestPoses
 from dropanchor_service.store.rows import KINDS
 from dropanchor_service.store.sites import Sites
+
+FaultPlace = Literal["caches", "decoder", "estimator", "ingest", "observer", "publication", "query"]
 
 _SECONDS = (0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5)
 
@@ -64,7 +67,9 @@ class Metrics:
     def _add_estimators(self) -> None:
         duration = partial(Histogram, buckets=_SECONDS, registry=self.registry)
         self.poses = self._counter("dropanchor_poses", "Poses that the estimators produced.")
-        self.faults = self._counter("dropanchor_faults", "Internal errors, by place.", ["where"])
+        faults = self._counter("dropanchor_faults", "Internal errors, by place.", ["where"])
+        # All series begin at 0: Prometheus sees no increase in one that begins with its first count.
+        self.faults: dict[FaultPlace, Counter] = {where: faults.labels(where) for where in get_args(FaultPlace)}
         self.estimator_seconds = duration("dropanchor_estimator_seconds", "Time to fuse one batch of samples.")
         self.delay_seconds = duration(
             "dropanchor_pose_delay_seconds",

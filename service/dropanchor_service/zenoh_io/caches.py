@@ -121,7 +121,7 @@ class ZenohCaches:
                 task()
                 self._poll()
             except Exception as error:
-                self._metrics.faults.labels("caches").inc()
+                self._metrics.faults["caches"].inc()
                 self._rare.exception("caches", error)
 
     def _pause_s(self) -> float:

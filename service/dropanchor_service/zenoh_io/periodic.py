@@ -42,5 +42,5 @@ class PeriodicPublisher(Worker):
             self.publish()
         except Exception as error:
             self.wake()
-            self._metrics.faults.labels("publication").inc()
+            self._metrics.faults["publication"].inc()
             self._log.exception(f"publication of {self._name}", error)

@@ -120,7 +120,7 @@ class ZenohAnswers:
                 except QueryError as error:
                     query.reply_err(to_json({"error": str(error)}), encoding=zenoh.Encoding.APPLICATION_JSON)
                 except Exception as error:
-                    self._metrics.faults.labels("query").inc()
+                    self._metrics.faults["query"].inc()
                     self._log.exception("query", error)
                     query.reply_err(to_json({"error": "internal error"}), encoding=zenoh.Encoding.APPLICATION_JSON)
 

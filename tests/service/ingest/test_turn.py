@@ -213,7 +213,7 @@ def test_a_row_that_fails_repeatedly_is_quarantined_and_its_samples_are_counted(
     for _ in range(FAULTS_BEFORE_QUARANTINE + 4):
         bench.send("a", ranges(1.0))
     assert bench.rejected() == {"estimator_fault": 4}
-    assert bench.total(bench.metrics.faults, where="estimator") == FAULTS_BEFORE_QUARANTINE
+    assert bench.faults() == {"estimator": FAULTS_BEFORE_QUARANTINE}
 
 
 def test_a_payload_that_makes_the_decoder_fail_harms_no_other_payload(monkeypatch: pytest.MonkeyPatch) -> None:
