@@ -11,8 +11,8 @@ from dropanchor_service.api.app import create_app_of
 from dropanchor_service.api.http.borders import border_of
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.health import Ready
+from dropanchor_service.api.routes.shared_parts import SharedParts
 from dropanchor_service.api.routes.site_parts import SiteParts
-from dropanchor_service.api.site_routers import SharedParts
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.persistence.site_folders import SiteFolders
 from dropanchor_service.persistence.zone_events import ZoneEvents

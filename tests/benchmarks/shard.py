@@ -14,8 +14,8 @@ from prometheus_client import CollectorRegistry
 from dropanchor_schemas import Anchor
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.app import create_app_of
+from dropanchor_service.api.routes.shared_parts import SharedParts
 from dropanchor_service.api.routes.site_parts import SiteParts
-from dropanchor_service.api.site_routers import SharedParts
 from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State
 from dropanchor_service.plans.store import PlanStore

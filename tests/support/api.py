@@ -30,9 +30,6 @@ from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.identity import Authenticator
 from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTable
 from dropanchor_service.store.omlox_items import OmloxItems
-from support.lazy_routes import make_routes_late
-
-make_routes_late()
 
 T_NS = 1_800_000_000_000_000_000
 

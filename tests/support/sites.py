@@ -11,8 +11,8 @@ from dropanchor_schemas import Anchor
 from dropanchor_schemas.site import Site
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.app import create_app_of
+from dropanchor_service.api.routes.shared_parts import SharedParts
 from dropanchor_service.api.routes.site_parts import SiteParts
-from dropanchor_service.api.site_routers import SharedParts
 from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State
 from dropanchor_service.plans.store import PlanStore
@@ -20,9 +20,6 @@ from dropanchor_service.security.identity import Authenticator
 from dropanchor_service.settings.quota import Quota
 from dropanchor_service.store import LatestPoses, Sites, SiteStore
 from dropanchor_service.store.omlox_items import OmloxItems
-from support.lazy_routes import make_routes_late
-
-make_routes_late()
 
 T_NS = 1_800_000_000_000_000_000
 

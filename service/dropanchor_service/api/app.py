@@ -1,6 +1,7 @@
 """Build the FastAPI application. Everything it uses is passed in."""
 
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
@@ -8,7 +9,7 @@ from typing import TYPE_CHECKING
 from fastapi import FastAPI, Request
 from prometheus_client import CollectorRegistry
 from starlette.responses import RedirectResponse
-from starlette.routing import Match, Route
+from starlette.routing import BaseRoute, Match, Route
 from starlette.types import Scope
 
 from dropanchor_service.answers.answers import Answers
@@ -19,16 +20,16 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, add_error_han
 from dropanchor_service.api.http.headers import SecurityHeaders, allow_origins
 from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
 from dropanchor_service.api.http.rates import RateLimiter
-from dropanchor_service.api.omlox.feed.socket import Doorkeeper
-from dropanchor_service.api.omlox.router import add_omlox
+from dropanchor_service.api.omlox.router import omlox_routes
 from dropanchor_service.api.routes.below import below
 from dropanchor_service.api.routes.dashboard import page_mounts
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.routes.plan_images import MAX_UPLOAD_BYTES
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.shared_parts import SharedParts
+from dropanchor_service.api.routes.site_of_request import SitesOfApp
 from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.api.routes.sites import sites_router
-from dropanchor_service.api.site_routers import SharedParts, ingest_routers, site_routers
+from dropanchor_service.api.site_routers import ingest_routers, site_routers
 from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.phones.intake import Receive
 from dropanchor_service.plans.store import PlanStore
@@ -108,26 +109,29 @@ def create_app_of(
     An only site has them also without. With several, the page shows the site in its address, `/?site=…`, and without
     one the overview of the sites takes its place.
     """
-    site_of = SiteOfRequest(sites)
-    app = _app_without_routes(shared, site_of)
+    served = SitesOfApp(sites)
+    app = _app_without_routes(shared, served)
     if dashboard is not None:  # before the interfaces: a page needs many files at once
-        app.router.routes.extend([*([] if site_of.only else [OverviewFirst()]), *page_mounts(dashboard)])
-    of_site = site_routers(site_of, shared)
-    without_site = of_site if site_of.only else ingest_routers(site_of, shared)
-    for router in (
-        *without_site,
-        sites_router(site_of, of_site),
-        health_router(ready, impaired),
-    ):
-        app.router.routes.extend(below(PREFIX, router.routes))
+        app.router.routes.extend([*([] if served.only else [OverviewFirst()]), *page_mounts(dashboard)])
+    has_one_site = served.only is not None
+    app.router.routes.extend(_routes(has_one_site))
+    app.router.routes.extend(below(PREFIX, health_router(ready, impaired).routes))
     app.router.routes.extend(metrics_router(registry).routes)
     if all(one.omlox is not None for one in sites):
-        doorkeeper = Doorkeeper(shared.authenticator, shared.rate_limiter)
-        add_omlox(app, site_of, doorkeeper, shared.stopping)
-    if site_of.only is None:
+        app.router.routes.extend(omlox_routes(has_one_site))
+    if not has_one_site:
         _refuse_what_names_no_site(app, len(sites))
     app.openapi = lambda: openapi_of(app)  # type: ignore[method-assign]
     return app
+
+
+@cache
+def _routes(has_one_site: bool) -> tuple[BaseRoute, ...]:
+    """Return the routes of the sites. They hold nothing of an application, so all those of a process share them."""
+    of_site = site_routers()
+    without_site = of_site if has_one_site else ingest_routers()
+    routers = (*without_site, sites_router(of_site))
+    return tuple(route for router in routers for route in below(PREFIX, router.routes))
 
 
 def _refuse_what_names_no_site(app: FastAPI, sites: int) -> None:
@@ -152,7 +156,7 @@ class OverviewFirst(Route):
         return (Match.NONE, {}) if names_site else (match, child_scope)
 
 
-def _app_without_routes(shared: SharedParts, site_of: SiteOfRequest) -> FastAPI:
+def _app_without_routes(shared: SharedParts, sites: SitesOfApp) -> FastAPI:
     """Return an application with the middleware alone."""
     app = FastAPI(
         title="Dropanchor",
@@ -163,12 +167,13 @@ def _app_without_routes(shared: SharedParts, site_of: SiteOfRequest) -> FastAPI:
         redirect_slashes=False,
     )
     app.add_middleware(BodyLimit, max_bytes=MAX_BODY_BYTES, of_paths={f"{PREFIX}/plan-images": MAX_UPLOAD_BYTES})
-    only_site = None if site_of.only is None else site_of.only.id
+    app.state.sites, app.state.shared = sites, shared
+    only_site = None if sites.only is None else sites.only.id
     app.add_middleware(
         Access,
         authenticator=shared.authenticator,
         rate_limiter=shared.rate_limiter,
-        members=site_of.members,
+        members=sites.members,
         only_site=only_site,
     )
     app.add_middleware(Borders, border=shared.border)

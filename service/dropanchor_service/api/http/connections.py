@@ -12,15 +12,13 @@ class TooManyConnectionsError(Exception):
 class OpenConnections:
     """Open connections of each client."""
 
-    def __init__(self, limit: int) -> None:
-        """limit: of each client."""
-        self._limit = limit
+    def __init__(self) -> None:
         self._open: Counter[str] = Counter()
 
     @contextmanager
-    def one_more(self, client: str) -> Iterator[None]:
-        """Count a connection until the block ends. Raises TooManyConnectionsError."""
-        if self._open[client] >= self._limit:
+    def one_more(self, client: str, limit: int) -> Iterator[None]:
+        """Count a connection until the block ends. limit: of each client. Raises TooManyConnectionsError."""
+        if self._open[client] >= limit:
             raise TooManyConnectionsError
         self._open[client] += 1
         try:

@@ -6,13 +6,8 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from dropanchor_service.api.omlox.hub import Hub
-from dropanchor_service.api.routes.site_of_request import ForEachSite, SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import ForEachSite
 from dropanchor_service.api.routes.site_parts import SiteParts
-
-
-def hubs_of(site_of: SiteOfRequest) -> ForEachSite[Hub]:
-    """Return what gives each site its hub."""
-    return ForEachSite(site_of, _hub_of_site)
 
 
 def _hub_of_site(parts: SiteParts) -> Hub:
@@ -21,9 +16,8 @@ def _hub_of_site(parts: SiteParts) -> Hub:
 
 
 def hub_of(connection: HTTPConnection) -> Hub:
-    """Return the hub. `add_omlox` puts what finds it into the state of the application. Raises ProblemError."""
-    hubs: ForEachSite[Hub] = connection.app.state.omlox_hubs
-    return hubs(connection)
+    """Raises ProblemError; see `SitesOfApp.parts`."""
+    return ForEachSite(_hub_of_site)(connection)
 
 
 async def _hub_of_request(connection: HTTPConnection) -> Hub:

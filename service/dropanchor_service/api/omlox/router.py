@@ -1,40 +1,38 @@
 """All routes of the omlox interface, on the stores of the service."""
 
 from functools import cache
-from threading import Event
 from typing import Any
 
-from fastapi import APIRouter, FastAPI, Request
+from fastapi import APIRouter, Request
 from starlette.responses import Response
+from starlette.routing import BaseRoute
 
 from dropanchor_service.api.http.site_in_path import OMLOX_PREFIX
 from dropanchor_service.api.omlox.document import document_of
-from dropanchor_service.api.omlox.feed.socket import Doorkeeper, feed_router
-from dropanchor_service.api.omlox.hub_of_request import hubs_of
+from dropanchor_service.api.omlox.feed.socket import feed_router
 from dropanchor_service.api.omlox.routes.fences import fences_router
 from dropanchor_service.api.omlox.routes.providers import providers_router
 from dropanchor_service.api.omlox.routes.trackables import trackables_router
 from dropanchor_service.api.omlox.routes.zones import zones_router
 from dropanchor_service.api.routes.below import below
 from dropanchor_service.api.routes.parameters import json_response
-from dropanchor_service.api.routes.site_of_request import SITE_PREFIX, SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import SITE_PREFIX
 
 VERSIONS = ("v2", "v1")
 """Older clients use v1, of which this is a part, too."""
 
 
-def add_omlox(app: FastAPI, site_of: SiteOfRequest, doorkeeper: Doorkeeper, stopping: Event) -> None:
-    """Add the interface to the application, with a document of its own: of each site below its id, and of an only one.
-
-    stopping: ends the WebSockets when set.
-    """
-    app.state.omlox_hubs = hubs_of(site_of)
-    described, feed = described_routes(), feed_router(doorkeeper, stopping)
+@cache
+def omlox_routes(has_one_site: bool) -> tuple[BaseRoute, ...]:
+    """Return the interface, with a document of its own: of each site below its id, and of an only one."""
+    described, feed = described_routes(), feed_router()
+    found: list[BaseRoute] = []
     for version in VERSIONS:
         path = f"{OMLOX_PREFIX}{version}"
-        for prefix in (SITE_PREFIX + path, *([path] if site_of.only else [])):
+        for prefix in (SITE_PREFIX + path, *([path] if has_one_site else [])):
             for router in (described, feed, _document_router(described)):
-                app.router.routes.extend(below(prefix, router.routes, documented=False))
+                found += below(prefix, router.routes, documented=False)
+    return tuple(found)
 
 
 def described_routes() -> APIRouter:

@@ -6,11 +6,11 @@ from starlette.responses import Response
 from dropanchor_schemas.answers import ClientAccess
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import answers_of
 from dropanchor_service.security.identity import Scope
 
 
-def access_router(site_of: SiteOfRequest) -> APIRouter:
+def access_router() -> APIRouter:
     router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
 
     @router.get(
@@ -21,7 +21,7 @@ def access_router(site_of: SiteOfRequest) -> APIRouter:
         responses=example_response({"scope": "admin"}) | problems(Kind.INVALID_REQUEST),
     )
     async def get_access(request: Request) -> Response:
-        site_of(request)  # an unknown one is refused
+        answers_of(request)  # an unknown one is refused
         scope: Scope = getattr(request.state, "scope", Scope.ADMIN)  # without authentication everybody may do all
         return json_response({"scope": scope.word})
 

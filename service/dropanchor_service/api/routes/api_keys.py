@@ -16,8 +16,9 @@ from dropanchor_schemas.api_keys import AccessKey, AccessKeyList, KeyRequest, Ne
 from dropanchor_schemas.sentences import said_by, say
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
-from dropanchor_service.security.api_keys import ApiKey, ApiKeyError, ApiKeys
+from dropanchor_service.api.routes.shared_parts import shared_of
+from dropanchor_service.api.routes.site_of_request import parts_of, sites_of
+from dropanchor_service.security.api_keys import ApiKey, ApiKeyError, ApiKeys, api_keys_of
 from dropanchor_service.security.identity import Scope
 
 _EXAMPLE: dict[str, Any] = {
@@ -34,16 +35,15 @@ The key works in this site alone, until it expires or is revoked. Its `secret` i
 hash. A key with a tag sends the samples of that tag and does nothing else; the page `/tag/` makes a phone that tag."""
 
 
-def api_keys_router(site_of: SiteOfRequest, keys: ApiKeys | None) -> APIRouter:
-    """Return the routes. keys: None without access control, with which nobody needs any."""
+def api_keys_router() -> APIRouter:
     router = APIRouter(tags=["keys"], dependencies=[NO_QUERY])
-    _add_list_route(router, site_of, keys)
-    _add_create_route(router, site_of, keys)
-    _add_revoke_route(router, site_of, keys)
+    _add_list_route(router)
+    _add_create_route(router)
+    _add_revoke_route(router)
     return router
 
 
-def _add_list_route(router: APIRouter, site_of: SiteOfRequest, keys: ApiKeys | None) -> None:
+def _add_list_route(router: APIRouter) -> None:
     @router.get(
         "/keys",
         operation_id="list_keys",
@@ -52,12 +52,13 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest, keys: ApiKeys | N
         responses=example_response({"available": True, "keys": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
     )
     def list_keys(request: Request) -> Response:
-        found = sorted(_keys_of(site_of, request, keys).items(), key=lambda entry: entry[1].made)
+        keys = _all_keys(request)
+        found = sorted(_keys_of(request, keys).items(), key=lambda entry: entry[1].made)
         listed = [_shown(identifier, key).model_dump() for identifier, key in found]
         return json_response({"available": keys is not None, "keys": listed})
 
 
-def _add_create_route(router: APIRouter, site_of: SiteOfRequest, keys: ApiKeys | None) -> None:
+def _add_create_route(router: APIRouter) -> None:
     @router.post(
         "/keys",
         operation_id="create_key",
@@ -73,7 +74,7 @@ def _add_create_route(router: APIRouter, site_of: SiteOfRequest, keys: ApiKeys |
     def create_key(
         body: Annotated[KeyRequest, Body(examples=[{"name": "Early shift", "scope": "write"}])], request: Request
     ) -> Response:
-        site = site_of.parts(request).id
+        site, keys = parts_of(request).id, _all_keys(request)
         if keys is None:
             raise ProblemError(Kind.NO_ACCESS_CONTROL, say("key_free", "Without access control nobody needs a key."))
         if any(key.name == body.name for key in keys.all().values()):
@@ -86,7 +87,7 @@ def _add_create_route(router: APIRouter, site_of: SiteOfRequest, keys: ApiKeys |
         return json_response(_shown(identifier, keys.all()[identifier]).model_dump() | {"secret": secret}, status=201)
 
 
-def _add_revoke_route(router: APIRouter, site_of: SiteOfRequest, keys: ApiKeys | None) -> None:
+def _add_revoke_route(router: APIRouter) -> None:
     @router.delete(
         "/keys/{key}",
         operation_id="revoke_key",
@@ -97,7 +98,8 @@ def _add_revoke_route(router: APIRouter, site_of: SiteOfRequest, keys: ApiKeys |
     def revoke_key(
         key: Annotated[str, Path(description="The id of the key.", examples=[_EXAMPLE["id"]])], request: Request
     ) -> None:
-        is_listed = key in _keys_of(site_of, request, keys)
+        keys = _all_keys(request)
+        is_listed = key in _keys_of(request, keys)
         with _changing():
             if keys is None or not is_listed or not keys.revoke_id(key):
                 raise ProblemError(
@@ -125,9 +127,14 @@ def _changing() -> Iterator[None]:
         ) from error
 
 
-def _keys_of(site_of: SiteOfRequest, request: Request, keys: ApiKeys | None) -> Mapping[str, ApiKey]:
+def _all_keys(request: Request) -> ApiKeys | None:
+    """Return the keys; None without access control, with which nobody needs any."""
+    return api_keys_of(shared_of(request).authenticator)
+
+
+def _keys_of(request: Request, keys: ApiKeys | None) -> Mapping[str, ApiKey]:
     """Return the keys of the site of a request that administrators may see and revoke. An only site has them all."""
-    sites = {site_of.parts(request).id, *([] if site_of.only is None else [None])}
+    sites = {parts_of(request).id, *([] if sites_of(request).only is None else [None])}
     all_keys = {} if keys is None else keys.all()
     return {name: key for name, key in all_keys.items() if key.site in sites and key.scope is not Scope.ADMIN}
 

@@ -2,13 +2,14 @@
 
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-from fastapi import APIRouter, Header, Path
+from fastapi import APIRouter, Header, Path, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.basemap import Basemap, TileMediaType
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
+from dropanchor_service.api.routes.shared_parts import shared_of
 from dropanchor_service.basemap.errors import UnreadableTileError
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ Column = Annotated[int, Path(ge=0, lt=2**31, description="Column of the tile, fr
 Line = Annotated[int, Path(ge=0, lt=2**31, description="Line of the tile, from the north.", examples=[10749])]
 
 
-def basemap_router(basemap: "ServedBasemap | None") -> APIRouter:
+def basemap_router() -> APIRouter:
     router = APIRouter(tags=["basemap"], dependencies=[NO_QUERY])
 
     @router.get(
@@ -52,14 +53,15 @@ def basemap_router(basemap: "ServedBasemap | None") -> APIRouter:
         response_model=Basemap,
         responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST),
     )
-    async def get_basemap() -> Response:
+    async def get_basemap(request: Request) -> Response:
+        basemap = shared_of(request).basemap
         return json_response((_NO_BASEMAP if basemap is None else basemap.description).model_dump())
 
-    _add_tile_route(router, basemap)
+    _add_tile_route(router)
     return router
 
 
-def _add_tile_route(router: APIRouter, basemap: "ServedBasemap | None") -> None:
+def _add_tile_route(router: APIRouter) -> None:
     @router.get(
         "/basemap/{z}/{x}/{y}",
         operation_id="get_basemap_tile",
@@ -72,8 +74,10 @@ def _add_tile_route(router: APIRouter, basemap: "ServedBasemap | None") -> None:
         z: Zoom,
         x: Column,
         y: Line,
+        request: Request,
         if_none_match: Annotated[str, Header(description="The `ETag` of the tile that you have.")] = "",
     ) -> Response:
+        basemap = shared_of(request).basemap
         if basemap is None:
             raise ProblemError(Kind.NO_BASEMAP, "The service has no base map: `basemap.tiles` is not set.")
         if max(x, y) >= 1 << z:

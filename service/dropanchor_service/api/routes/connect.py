@@ -10,14 +10,14 @@ from dropanchor_service.answers.connect_command import reachable_endpoint, simul
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
-from dropanchor_service.security.folder import SecurityFolder
+from dropanchor_service.api.routes.shared_parts import shared_of
+from dropanchor_service.api.routes.site_of_request import answers_of
 
 SIMULATED_TAG = "sim-1"
 _FORWARDED = ("forwarded", "x-forwarded-for", "x-real-ip", "via")
 
 
-def connect_router(site_of: SiteOfRequest, endpoints: tuple[str, ...], credentials: SecurityFolder | None) -> APIRouter:
+def connect_router() -> APIRouter:
     router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
 
     @router.get(
@@ -28,9 +28,9 @@ def connect_router(site_of: SiteOfRequest, endpoints: tuple[str, ...], credentia
         responses=example_response(examples.CONNECT) | problems(Kind.INVALID_REQUEST),
     )
     async def get_connect(request: Request) -> Response:
-        site, is_local = site_of(request).site.site, _is_local(request)
-        reachable = [reachable_endpoint(endpoint, _host(request)) for endpoint in endpoints]
-        folder = None
+        site, is_local, shared = answers_of(request).site.site, _is_local(request), shared_of(request)
+        reachable = [reachable_endpoint(endpoint, _host(request)) for endpoint in shared.endpoints]
+        folder, credentials = None, shared.credentials
         if credentials is not None:
             bundle = credentials.bundle(credentials.table.common_name(site.id, SIMULATED_TAG))
             folder = str(bundle.resolve()) if is_local else bundle.name

@@ -10,7 +10,7 @@ from dropanchor_schemas.tracks import Coverage
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes.parameters import TimeNs, example_response, json_response
 from dropanchor_service.api.routes.period import history_of, require_order, unreadable
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import answers_of
 from dropanchor_service.history.coverage import NO_COVERAGE
 from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.tracks import Tracks
@@ -46,7 +46,7 @@ class CoverageQuery(BaseModel):
     )
 
 
-def coverage_router(site_of: SiteOfRequest) -> APIRouter:
+def coverage_router() -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -58,7 +58,7 @@ def coverage_router(site_of: SiteOfRequest) -> APIRouter:
         responses=example_response(_EXAMPLE) | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
     )
     def get_history_coverage(query: Annotated[CoverageQuery, Query()], request: Request) -> Response:
-        tracks = history_of(site_of(request))
+        tracks = history_of(answers_of(request))
         try:
             return json_response(_coverage(tracks, query))
         except HistoryError as error:

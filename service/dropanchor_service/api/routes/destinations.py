@@ -22,7 +22,7 @@ from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.items import CHANGE_KINDS, DestinationId, delete, found, item_response, put
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import parts_of
 from dropanchor_service.delivery import write_only
 from dropanchor_service.delivery.channel import ChannelError, Verdict
 from dropanchor_service.delivery.event_parts import EventParts
@@ -34,18 +34,18 @@ _READ = (Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE)
 _ONE = (Kind.UNKNOWN_DESTINATION, *_READ)
 
 
-def destinations_router(site_of: SiteOfRequest) -> APIRouter:
+def destinations_router() -> APIRouter:
     router = APIRouter(tags=["destinations"], dependencies=[NO_QUERY])
-    _add_read_routes(router, site_of)
-    _add_put_route(router, site_of)
-    _add_delete_route(router, site_of)
-    _add_test_route(router, site_of)
-    _add_dead_letter_list_route(router, site_of)
-    _add_dead_letter_change_routes(router, site_of)
+    _add_read_routes(router)
+    _add_put_route(router)
+    _add_delete_route(router)
+    _add_test_route(router)
+    _add_dead_letter_list_route(router)
+    _add_dead_letter_change_routes(router)
     return router
 
 
-def _add_read_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_read_routes(router: APIRouter) -> None:
     @router.get(
         "/destinations",
         operation_id="list_destinations",
@@ -55,7 +55,7 @@ def _add_read_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         | problems(*_READ),
     )
     def list_destinations(request: Request) -> Response:
-        parts = site_of.parts(request).events
+        parts = parts_of(request).events
         with reading():
             queues = parts.deliveries.states()
         states = [_state(parts, one, queues.get(one.id, QueueState())) for one in parts.destinations.all.values()]
@@ -72,11 +72,11 @@ def _add_read_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.DESTINATION_STATE) | problems(*_ONE),
     )
     def get_destination(destination: DestinationId, request: Request) -> Response:
-        parts = site_of.parts(request).events
+        parts = parts_of(request).events
         return _response(parts, found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION))
 
 
-def _add_put_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_put_route(router: APIRouter) -> None:
     @router.put(
         "/destinations/{destination}",
         operation_id="put_destination",
@@ -93,13 +93,13 @@ def _add_put_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         allows: Conditions,
         request: Request,
     ) -> Response:
-        parts = site_of.parts(request).events
+        parts = parts_of(request).events
         usable = _usable(parts, body)
         put(parts.destinations, destination, body.id, usable, allows)
         return _response(parts, usable)
 
 
-def _add_delete_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_delete_route(router: APIRouter) -> None:
     @router.delete(
         "/destinations/{destination}",
         operation_id="delete_destination",
@@ -108,14 +108,14 @@ def _add_delete_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=problems(Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, *_ONE),
     )
     def delete_destination(destination: DestinationId, allows: Conditions, request: Request) -> Response:
-        parts = site_of.parts(request).events
+        parts = parts_of(request).events
         response = delete(parts.destinations, destination, allows, Kind.UNKNOWN_DESTINATION)
         with reading():
             parts.deliveries.drop(destination)
         return response
 
 
-def _add_test_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_test_route(router: APIRouter) -> None:
     @router.post(
         "/destinations/{destination}/test",
         operation_id="test_destination",
@@ -124,7 +124,7 @@ def _add_test_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.DESTINATION_TEST) | problems(Kind.DESTINATION_REFUSED, *_ONE),
     )
     async def test_destination(destination: DestinationId, request: Request) -> Response:
-        parts = site_of.parts(request).events
+        parts = parts_of(request).events
         known = found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
         try:
             parts.channels.check_settings(known)
@@ -136,7 +136,7 @@ def _add_test_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         return json_response(answer)
 
 
-def _add_dead_letter_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_dead_letter_list_route(router: APIRouter) -> None:
     @router.get(
         "/destinations/{destination}/dead-letters",
         operation_id="list_dead_letters",
@@ -145,7 +145,7 @@ def _add_dead_letter_list_route(router: APIRouter, site_of: SiteOfRequest) -> No
         responses=example_response(examples.DEAD_LETTERS) | problems(*_ONE),
     )
     def list_dead_letters(destination: DestinationId, request: Request) -> Response:
-        parts = site_of.parts(request).events
+        parts = parts_of(request).events
         found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
         with reading():
             dead = parts.deliveries.dead(destination)
@@ -153,7 +153,7 @@ def _add_dead_letter_list_route(router: APIRouter, site_of: SiteOfRequest) -> No
         return json_response({"dead_letters": letters})
 
 
-def _add_dead_letter_change_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_dead_letter_change_routes(router: APIRouter) -> None:
     @router.post(
         "/destinations/{destination}/dead-letters/retry",
         operation_id="retry_dead_letters",
@@ -163,7 +163,7 @@ def _add_dead_letter_change_routes(router: APIRouter, site_of: SiteOfRequest) ->
         responses=example_response({"retried": 1}) | problems(*_ONE),
     )
     def retry_dead_letters(destination: DestinationId, request: Request) -> Response:
-        site = site_of.parts(request)
+        site = parts_of(request)
         found(site.events.destinations, destination, Kind.UNKNOWN_DESTINATION)
         with reading():
             return json_response({"retried": site.events.deliveries.retry(destination, site.answers.now_ns())})
@@ -177,7 +177,7 @@ def _add_dead_letter_change_routes(router: APIRouter, site_of: SiteOfRequest) ->
         responses=problems(*_ONE),
     )
     def delete_dead_letters(destination: DestinationId, request: Request) -> Response:
-        parts = site_of.parts(request).events
+        parts = parts_of(request).events
         found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
         with reading():
             parts.deliveries.drop_dead(destination)

@@ -27,7 +27,8 @@ from dropanchor_service.api.routes.parameters import (
     json_response,
     words_of,
 )
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.shared_parts import shared_of
+from dropanchor_service.api.routes.site_of_request import parts_of
 from dropanchor_service.api.routes.stream import HEARTBEAT_S, MEDIA_TYPE, stopped_within
 from dropanchor_service.events.store import EventStore, Selection, StoredEvent
 
@@ -71,14 +72,14 @@ class EventQuery(EventFilter):
     limit: int = Field(default=100, ge=1, le=MAX_EVENTS, description="How many events to return.")
 
 
-def events_router(site_of: SiteOfRequest, stopping: ThreadEvent) -> APIRouter:
+def events_router() -> APIRouter:
     router = APIRouter(tags=["events"], dependencies=[Depends(_refuse_repeated)])
-    _add_list_route(router, site_of)
-    _add_stream_route(router, site_of, stopping)
+    _add_list_route(router)
+    _add_stream_route(router)
     return router
 
 
-def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_list_route(router: APIRouter) -> None:
     @router.get(
         "/events",
         operation_id="list_events",
@@ -89,7 +90,7 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.EVENTS) | problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE),
     )
     def list_events(query: Annotated[EventQuery, Query()], request: Request) -> Response:
-        store = site_of.parts(request).events.store
+        store = parts_of(request).events.store
         selection, after = query.selection(query.since), query.position()
         with reading():
             if query.since is None and after is None:
@@ -101,7 +102,7 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         return json_response({"events": [orjson.Fragment(event.body) for event in found], "next": following})
 
 
-def _add_stream_route(router: APIRouter, site_of: SiteOfRequest, stopping: ThreadEvent) -> None:
+def _add_stream_route(router: APIRouter) -> None:
     @router.get(
         "/events/stream",
         operation_id="stream_events",
@@ -119,7 +120,7 @@ def _add_stream_route(router: APIRouter, site_of: SiteOfRequest, stopping: Threa
     ) -> Response:
         if last_event_id is not None and re.fullmatch(SEQUENCE, last_event_id):
             query = query.model_copy(update={"after": last_event_id})
-        store = site_of.parts(request).events.store
+        store, stopping = parts_of(request).events.store, shared_of(request).stopping
         headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
         return StreamingResponse(_stream(store, query, stopping), media_type=MEDIA_TYPE, headers=headers)
 

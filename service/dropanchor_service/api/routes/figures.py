@@ -17,7 +17,7 @@ from dropanchor_service.api.routes.contents import TEXT
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.parameters import COMMA, Ids, example_response, ids_of, json_response
 from dropanchor_service.api.routes.period import TagsInPeriod, history_of, limits_of, selected_tags, unreadable
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import parts_of
 from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.events.stays import TimeInZone, times_in_zones
 from dropanchor_service.history.errors import HistoryError, TooMuchError
@@ -60,7 +60,7 @@ class FiguresQuery(TagsInPeriod):
     )
 
 
-def figures_router(site_of: SiteOfRequest) -> APIRouter:
+def figures_router() -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -73,7 +73,7 @@ def figures_router(site_of: SiteOfRequest) -> APIRouter:
         | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE, Kind.EVENTS_UNREADABLE),
     )
     def get_figures(query: Annotated[FiguresQuery, Query()], request: Request) -> Response:
-        parts = site_of.parts(request)
+        parts = parts_of(request)
         found = _figures(parts.answers, parts.events, query)
         if query.format == "json":
             return json_response(found)

@@ -11,7 +11,7 @@ from dropanchor_schemas.heat_map import HeatMap
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.parameters import example_response, json_response
 from dropanchor_service.api.routes.period import TagsInPeriod, history_of, limits_of, selected_tags, unreadable
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import answers_of
 from dropanchor_service.history.errors import HistoryError, TooMuchError
 from dropanchor_service.history.heat_cells import LARGEST_M, SMALLEST_M
 from dropanchor_service.history.heat_map import MAX_SQUARES
@@ -44,7 +44,7 @@ class HeatMapQuery(TagsInPeriod):
     )
 
 
-def heat_map_router(site_of: SiteOfRequest) -> APIRouter:
+def heat_map_router() -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -56,7 +56,7 @@ def heat_map_router(site_of: SiteOfRequest) -> APIRouter:
         responses=example_response(_EXAMPLE) | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
     )
     def get_heat_map(query: Annotated[HeatMapQuery, Query()], request: Request) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         from_ns, to_ns = limits_of(query, answers.now_ns())
         tracks = history_of(answers)
         try:

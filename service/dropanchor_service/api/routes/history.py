@@ -7,13 +7,13 @@ from dropanchor_schemas.tracks import History
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.api.routes.period import unreadable
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import answers_of
 from dropanchor_service.history.errors import HistoryError
 
 _EXAMPLE = {"enabled": True, "from_ns": 1_797_408_000_000_000_000, "to_ns": 1_800_000_000_000_000_000}
 
 
-def history_router(site_of: SiteOfRequest) -> APIRouter:
+def history_router() -> APIRouter:
     router = APIRouter(tags=["poses"], dependencies=[NO_QUERY])
 
     @router.get(
@@ -24,7 +24,7 @@ def history_router(site_of: SiteOfRequest) -> APIRouter:
         responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
     )
     def get_history(request: Request) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         if answers.tracks is None:
             return json_response({"enabled": False, "from_ns": None, "to_ns": None})
         try:

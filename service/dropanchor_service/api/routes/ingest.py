@@ -20,7 +20,8 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.contents import BYTES, TEXT
 from dropanchor_service.api.routes.parameters import example_response, json_response
-from dropanchor_service.api.routes.site_of_request import ForEachSite, SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import ForEachSite, parts_of
+from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.phones.intake import PhoneIntake
 from dropanchor_tag_client.sources.phones.pairing import Signs
 from dropanchor_tag_client.sources.phones.readings import PhoneError
@@ -75,13 +76,15 @@ class OfSensorLogger(OfApp):
     )
 
 
-def ingest_router(site_of: SiteOfRequest) -> APIRouter:
+def ingest_router() -> APIRouter:
     router = APIRouter(tags=["ingest"])
-    _add_samples_route(router, site_of)
-    _add_sensor_logger_route(
-        router, ForEachSite(site_of, lambda site: PhoneIntake(site.receive, site.receive_health, parse, Session))
-    )
+    _add_samples_route(router)
+    _add_sensor_logger_route(router, ForEachSite(_phones))
     return router
+
+
+def _phones(site: SiteParts) -> PhoneIntake[Message]:
+    return PhoneIntake(site.receive, site.receive_health, parse, Session)
 
 
 def encoding_of(request: Request) -> str:
@@ -89,7 +92,7 @@ def encoding_of(request: Request) -> str:
     return request.headers.get("content-type", "").partition(";")[0].strip().lower()
 
 
-def _add_samples_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_samples_route(router: APIRouter) -> None:
     @router.post(
         "/ingest/samples",
         operation_id="ingest_samples",
@@ -106,7 +109,7 @@ def _add_samples_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     async def ingest_samples(request: Request, query: Annotated[OfTag, Query()]) -> Response:
         tag, payload = tag_of(request, query), await request.body()
         encoding = encoding_of(request)
-        site_of.parts(request).receive(tag, payload, encoding)  # what cannot be decoded is counted there too
+        parts_of(request).receive(tag, payload, encoding)  # what cannot be decoded is counted there too
         samples = count_samples(payload, encoding)
         if isinstance(samples, Rejection):
             raise ProblemError(Kind.SAMPLES_REJECTED, f"{samples.reason}: {samples.detail}.", reason=samples.reason)

@@ -12,12 +12,12 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.ingest import OfTag, encoding_of, tag_of
 from dropanchor_service.api.routes.parameters import example_response, json_response
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import parts_of
 
 _BODY = {ENCODING_JSON: {"schema": {"$ref": "#/components/schemas/TagHealthMessage"}, "example": examples.HEALTH}}
 
 
-def ingest_health_router(site_of: SiteOfRequest) -> APIRouter:
+def ingest_health_router() -> APIRouter:
     router = APIRouter(tags=["ingest"])
 
     @router.post(
@@ -35,7 +35,7 @@ def ingest_health_router(site_of: SiteOfRequest) -> APIRouter:
     async def ingest_health(request: Request, query: Annotated[OfTag, Query()]) -> Response:
         tag, payload = tag_of(request, query), await request.body()
         encoding = encoding_of(request)
-        site_of.parts(request).receive_health(tag, payload, encoding)  # what cannot be decoded is counted there too
+        parts_of(request).receive_health(tag, payload, encoding)  # what cannot be decoded is counted there too
         report = decode_health(payload, encoding)
         if isinstance(report, Rejection):
             raise ProblemError(Kind.HEALTH_REJECTED, f"{report.reason}: {report.detail}.", reason=report.reason)

@@ -20,7 +20,7 @@ from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.contents import TEXT
 from dropanchor_service.api.routes.ingest import OfApp, OfTag, tag_of
 from dropanchor_service.api.routes.parameters import example_response, json_response
-from dropanchor_service.api.routes.site_of_request import ForEachSite, SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import ForEachSite
 from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.phones.intake import PhoneIntake
 from dropanchor_service.phones.phyphox import Message, parse
@@ -41,10 +41,10 @@ _BODY = {
 }
 
 
-def ingest_phyphox_router(site_of: SiteOfRequest) -> APIRouter:
+def ingest_phyphox_router() -> APIRouter:
     router = APIRouter(tags=["ingest"])
     _add_experiment_routes(router)
-    _add_readings_route(router, ForEachSite(site_of, _phones))
+    _add_readings_route(router, ForEachSite(_phones))
     return router
 
 

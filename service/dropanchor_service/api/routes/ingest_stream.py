@@ -7,7 +7,6 @@ again: the numbers in the payload say that it is the same one, and it is counted
 import asyncio
 import time
 from collections.abc import AsyncIterator
-from threading import Event
 
 from fastapi import APIRouter
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -20,13 +19,13 @@ from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Rejection
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, identify, key_command, speaks_in
 from dropanchor_service.api.http.closing import reason_of
-from dropanchor_service.api.http.connections import OpenConnections, TooManyConnectionsError
+from dropanchor_service.api.http.connections import TooManyConnectionsError
 from dropanchor_service.api.http.errors import Kind, ProblemError
-from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.ingest import count_samples
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.shared_parts import shared_of
+from dropanchor_service.api.routes.site_of_request import parts_of, sites_of
 from dropanchor_service.api.routes.site_parts import SiteParts
-from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
+from dropanchor_service.security.identity import Identity, UnauthenticatedError
 
 PROTOCOL = "dropanchor.samples"
 KEY_PROTOCOL = "dropanchor.key."
@@ -93,44 +92,39 @@ class _Acknowledgements:
 
 
 class _Stream:
-    """Serve all connections."""
+    """Serve one connection."""
 
-    def __init__(
-        self,
-        site_of: SiteOfRequest,
-        stopping: Event,
-        authenticator: Authenticator | None,
-        rate_limiter: RateLimiter | None,
-    ) -> None:
-        self._site_of = site_of
-        self._key_command = key_command(site_of.only is None)
-        self._stopping = stopping
-        self._authenticator = authenticator
-        self._rate_limiter = rate_limiter
-        self._connections = OpenConnections(CONNECTIONS_PER_KEY)
-        self._started_ns = time.time_ns()
+    def __init__(self, socket: WebSocket) -> None:
+        self._socket = socket
+        self._shared = shared_of(socket)
+        self._authenticator = self._shared.authenticator
+        self._has_several_sites = sites_of(socket).only is None
+        self._key_command = key_command(self._has_several_sites)
 
-    async def serve(self, socket: WebSocket) -> None:
+    async def serve(self) -> None:
         """Serve an accepted connection until its end.
 
         Raises _ClosedError, TooManyConnectionsError and WebSocketDisconnect.
         """
-        identity = await self._identity(socket)
-        tag, site = self._tag(socket, identity), self._site(socket, identity)
-        client, answers = client_of(socket, identity), site.answers
-        acknowledgements = _Acknowledgements(answers, tag, self._started_ns)
-        with self._connections.one_more(client), answers.tags.presence.connected(tag):
-            await socket.send_text(acknowledgements.greeting())
-            async for payload, encoding in _messages(socket):
+        identity = await self._identity()
+        tag, site = self._tag(identity), self._site(identity)
+        client, answers = client_of(self._socket, identity), site.answers
+        acknowledgements = _Acknowledgements(answers, tag, self._shared.started_ns)
+        with (
+            self._shared.sample_connections.one_more(client, CONNECTIONS_PER_KEY),
+            answers.tags.presence.connected(tag),
+        ):
+            await self._socket.send_text(acknowledgements.greeting())
+            async for payload, encoding in _messages(self._socket):
                 await self._wait_for_turn(client)
                 self._require_open(identity)
                 site.receive(tag, payload, encoding)
-                await socket.send_text(acknowledgements.of(payload, encoding))
+                await self._socket.send_text(acknowledgements.of(payload, encoding))
 
-    async def _identity(self, socket: WebSocket) -> Identity | None:
+    async def _identity(self) -> Identity | None:
         if self._authenticator is None:
             return None
-        secret = bearer_of(socket) or key_among_protocols(socket)
+        secret = bearer_of(self._socket) or key_among_protocols(self._socket)
         if not secret:
             raise _ClosedError(
                 UNAUTHENTICATED,
@@ -143,9 +137,9 @@ class _Stream:
                 UNAUTHENTICATED, say("not_accepted", "Not accepted: {why}.", why=said_by(error))
             ) from error
 
-    def _tag(self, socket: WebSocket, identity: Identity | None) -> str:
+    def _tag(self, identity: Identity | None) -> str:
         """Return the tag that a connection speaks for: that of its key, or without credentials the one it names."""
-        named = socket.query_params.get("tag")
+        named = self._socket.query_params.get("tag")
         own = None if identity is None else identity.tag
         if identity is not None and own is None:
             raise _ClosedError(
@@ -167,16 +161,16 @@ class _Stream:
             ) from error
         return tag
 
-    def _site(self, socket: WebSocket, identity: Identity | None) -> SiteParts:
+    def _site(self, identity: Identity | None) -> SiteParts:
         """Return the site that a connection speaks in: the one in its path, or that of its key. Raises _ClosedError."""
         if identity is not None:
-            socket.state.site = identity.site
+            self._socket.state.site = identity.site
         try:
-            site = self._site_of.parts(socket)
+            site = parts_of(self._socket)
         except ProblemError as error:
             unnamed = say("which_site", "Say which site this is: add ?site=SITE to the address of the page.")
             raise _ClosedError(UNREADABLE, unnamed if error.kind is Kind.SEVERAL_SITES else error.detail) from error
-        if identity is not None and not speaks_in(identity, site.id, self._site_of.only is None):
+        if identity is not None and not speaks_in(identity, site.id, self._has_several_sites):
             raise _ClosedError(
                 FORBIDDEN,
                 say(
@@ -190,14 +184,14 @@ class _Stream:
 
     async def _wait_for_turn(self, client: str) -> None:
         """Wait until the rate limit of the client allows another message. Nothing is lost."""
-        if self._rate_limiter is None or (self._authenticator is None and client == LOOPBACK):
+        if self._shared.rate_limiter is None or (self._authenticator is None and client == LOOPBACK):
             return
-        while wait_s := self._rate_limiter.wait_s(client):
+        while wait_s := self._shared.rate_limiter.wait_s(client):
             await asyncio.sleep(wait_s)
 
     def _require_open(self, identity: Identity | None) -> None:
         """Raise _ClosedError once the service stops or the key is no longer valid."""
-        if self._stopping.is_set():
+        if self._shared.stopping.is_set():
             raise _ClosedError(RESTART, say("stops", "The service stops. Connect again and send this message again."))
         if (
             identity is not None
@@ -214,20 +208,15 @@ class _Stream:
             )
 
 
-def ingest_stream_router(
-    site_of: SiteOfRequest,
-    stopping: Event,
-    authenticator: Authenticator | None,
-    rate_limiter: RateLimiter | None,
-) -> APIRouter:
+def ingest_stream_router() -> APIRouter:
     """Return the router of the WebSocket. OpenAPI has no WebSockets: `reference/rest.md` describes it."""
-    router, stream = APIRouter(), _Stream(site_of, stopping, authenticator, rate_limiter)
+    router = APIRouter()
 
     @router.websocket("/ingest/stream")
     async def ingest_stream(socket: WebSocket) -> None:
         await socket.accept(PROTOCOL if PROTOCOL in _protocols(socket) else None)
         try:
-            await stream.serve(socket)
+            await _Stream(socket).serve()
         except TooManyConnectionsError:
             too_many = say(
                 "too_many",

@@ -7,7 +7,7 @@ from dropanchor_schemas.north import SiteNorth
 from dropanchor_service.answers.north import site_north_of
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import answers_of
 
 _EXAMPLE = {
     "declination_rad": 0.07,
@@ -23,7 +23,7 @@ _EXAMPLE = {
 }
 
 
-def north_router(site_of: SiteOfRequest) -> APIRouter:
+def north_router() -> APIRouter:
     router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
 
     @router.get(
@@ -37,6 +37,6 @@ def north_router(site_of: SiteOfRequest) -> APIRouter:
         responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST),
     )
     async def get_site_north(request: Request) -> Response:
-        return json_response(site_north_of(site_of(request)))
+        return json_response(site_north_of(answers_of(request)))
 
     return router

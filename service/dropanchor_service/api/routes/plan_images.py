@@ -13,7 +13,7 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import plan_examples as examples
 from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import parts_of
 from dropanchor_service.plans.reading.file_types import file_type_of
 from dropanchor_service.plans.reading.messages import Request as ReadRequest
 from dropanchor_service.plans.reading.refused import RefusedError
@@ -67,14 +67,14 @@ class UploadQuery(BaseModel):
         )
 
 
-def plan_images_router(site_of: SiteOfRequest) -> APIRouter:
+def plan_images_router() -> APIRouter:
     router = APIRouter(tags=["plans"])
-    _add_upload_route(router, site_of)
-    _add_image_route(router, site_of)
+    _add_upload_route(router)
+    _add_image_route(router)
     return router
 
 
-def _add_upload_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_upload_route(router: APIRouter) -> None:
     reader = PlanReader()
 
     @router.post(
@@ -89,7 +89,7 @@ def _add_upload_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         openapi_extra={"requestBody": {"required": True, "content": _binary(*_UPLOADED)}},
     )
     async def upload_plan_image(request: Request, query: Annotated[UploadQuery, Query()]) -> Response:
-        parts, content = site_of.parts(request), await request.body()
+        parts, content = parts_of(request), await request.body()
         try:
             media_type = file_type_of(content, request.headers.get("content-type", ""))
             read = await reader.read(content, query.to_read(media_type, parts.answers.site))
@@ -104,7 +104,7 @@ def _add_upload_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         return json_response(uploaded.model_dump(), status=201)
 
 
-def _add_image_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_image_route(router: APIRouter) -> None:
     @router.get(
         "/plan-images/{image}",
         operation_id="get_plan_image",
@@ -121,7 +121,7 @@ def _add_image_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         ],
         request: Request,
     ) -> Response:
-        store = site_of.parts(request).plans
+        store = parts_of(request).plans
         known = store.image(image)
         content = None if known is None else _content(store, known)
         if known is None or content is None:

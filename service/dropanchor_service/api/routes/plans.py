@@ -8,25 +8,25 @@ from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.routes import plan_examples as examples
 from dropanchor_service.api.routes.item_routes import Resource, add_item_routes
 from dropanchor_service.api.routes.parameters import NO_QUERY
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import parts_of
 
 
-def plans_router(site_of: SiteOfRequest) -> APIRouter:
+def plans_router() -> APIRouter:
     router = APIRouter(tags=["plans"], dependencies=[NO_QUERY])
-    add_item_routes(router, _plans(site_of))
+    add_item_routes(router, _plans())
     return router
 
 
-def _plans(site_of: SiteOfRequest) -> Resource[Plan]:
+def _plans() -> Resource[Plan]:
     def check_image(plan: Plan, request: Request) -> None:
-        if site_of.parts(request).plans.image(plan.image.id) != plan.image:
+        if parts_of(request).plans.image(plan.image.id) != plan.image:
             detail = say(
                 "plan_upload", "Upload the image with POST /api/v1/plan-images, and put `image` of the answer here."
             )
             raise ProblemError(Kind.IMAGE_NOT_UPLOADED, detail)
 
     return Resource(
-        lambda request: site_of.parts(request).plans,
+        lambda request: parts_of(request).plans,
         path="plans",
         name="plan",
         list_summary="List the floor plans",

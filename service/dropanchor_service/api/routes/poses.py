@@ -31,24 +31,24 @@ from dropanchor_service.api.routes.parameters import (
     id_of,
     json_response,
 )
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import answers_of
 
 PIECE_BYTES = 400_000  # larger writes are copied repeatedly while the kernel does not accept all of them
 
 _NEGOTIATION = (Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED, Kind.INVALID_REQUEST)
 
 
-def poses_router(site_of: SiteOfRequest) -> APIRouter:
+def poses_router() -> APIRouter:
     router = APIRouter(tags=["poses"])
-    _add_pose_route(router, site_of)
-    _add_explanation_route(router, site_of)
-    _add_list_route(router, site_of)
+    _add_pose_route(router)
+    _add_explanation_route(router)
+    _add_list_route(router)
     return router
 
 
-def _add_pose_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_pose_route(router: APIRouter) -> None:
     async def get_pose(tag: TagId, query: Annotated[AtTime, Query()], request: Request) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         as_geojson = geojson.is_preferred(request, answers)
         if query.at is None:
             pose = _pose_of(answers, tag)
@@ -70,7 +70,7 @@ def _add_pose_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     )
 
 
-def _add_explanation_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_explanation_route(router: APIRouter) -> None:
     @router.get(
         "/tags/{tag}/explain",
         operation_id="explain_pose",
@@ -80,14 +80,14 @@ def _add_explanation_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.INVALID_REQUEST),
     )
     async def explain_pose(tag: TagId, query: Annotated[LastInnovations, Query()], request: Request) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         explanation = explanation_of(answers, known_tag(answers, tag), query.last)
         if explanation is None:
             raise _no_pose_yet(answers, tag)
         return json_response(explanation)
 
 
-def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_list_route(router: APIRouter) -> None:
     @router.get(
         "/poses",
         operation_id="list_poses",
@@ -96,7 +96,7 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=_offers(examples.POSE_LIST, PoseFeatureCollection) | problems(*_NEGOTIATION),
     )
     async def list_poses(query: Annotated[PoseQuery, Query()], request: Request) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         as_geojson = geojson.is_preferred(request, answers)
         found = [tag for tag in map(answers.tags.find, query.tags) if tag is not None]
         tags = found if query.tags else None

@@ -11,7 +11,7 @@ from dropanchor_schemas.sentences import said_by, say, with_stop
 from dropanchor_service.api.http.access import LOOPBACK, client_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import parts_of
 from dropanchor_service.delivery.receiver_networks import AllowedNetwork, private_network
 from dropanchor_service.store.items import FullError
 
@@ -38,15 +38,15 @@ def _network(
 NetworkInPath = Annotated[str, Depends(_network)]
 
 
-def receiver_networks_router(site_of: SiteOfRequest) -> APIRouter:
+def receiver_networks_router() -> APIRouter:
     router = APIRouter(tags=["destinations"], dependencies=[NO_QUERY])
-    _add_list_route(router, site_of)
-    _add_allow_route(router, site_of)
-    _add_remove_route(router, site_of)
+    _add_list_route(router)
+    _add_allow_route(router)
+    _add_remove_route(router)
     return router
 
 
-def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_list_route(router: APIRouter) -> None:
     @router.get(
         "/receiver-networks",
         operation_id="list_receiver_networks",
@@ -55,13 +55,13 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response({"networks": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
     )
     def list_networks(request: Request) -> Response:
-        networks = site_of.parts(request).events.channels.networks
+        networks = parts_of(request).events.channels.networks
         of_settings = [ReceiverNetwork(network=str(one), in_settings=True) for one in networks.of_settings]
         of_page = [ReceiverNetwork(network=one, in_settings=False) for one in networks.items.all]
         return json_response({"networks": [one.model_dump() for one in (*of_settings, *of_page)]})
 
 
-def _add_allow_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_allow_route(router: APIRouter) -> None:
     @router.put(
         "/receiver-networks/{network}",
         operation_id="allow_receiver_network",
@@ -72,7 +72,7 @@ def _add_allow_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         | problems(Kind.NO_ACCESS_CONTROL, Kind.ITEMS_FULL, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
     )
     def allow_network(network: NetworkInPath, request: Request) -> Response:
-        items = site_of.parts(request).events.channels.networks.items
+        items = parts_of(request).events.channels.networks.items
         _refuse_anybody(request)
         with saving():
             try:
@@ -84,7 +84,7 @@ def _add_allow_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         return json_response({"network": network, "in_settings": False})
 
 
-def _add_remove_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_remove_route(router: APIRouter) -> None:
     @router.delete(
         "/receiver-networks/{network}",
         operation_id="remove_receiver_network",
@@ -94,7 +94,7 @@ def _add_remove_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=problems(Kind.UNKNOWN_NETWORK, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
     )
     def remove_network(network: NetworkInPath, request: Request) -> Response:
-        items = site_of.parts(request).events.channels.networks.items
+        items = parts_of(request).events.channels.networks.items
         with saving():
             try:
                 items.remove(network)

@@ -12,7 +12,7 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import parts_of
 from dropanchor_service.recording.recorder import Recorder
 
 MEDIA_TYPE = "application/octet-stream"
@@ -27,16 +27,16 @@ FileName = Annotated[
 ]
 
 
-def recordings_router(site_of: SiteOfRequest) -> APIRouter:
+def recordings_router() -> APIRouter:
     router = APIRouter(tags=["recordings"], dependencies=[NO_QUERY])
-    _add_list_route(router, site_of)
-    _add_start_route(router, site_of)
-    _add_stop_route(router, site_of)
-    _add_download_route(router, site_of)
+    _add_list_route(router)
+    _add_start_route(router)
+    _add_stop_route(router)
+    _add_download_route(router)
     return router
 
 
-def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_list_route(router: APIRouter) -> None:
     @router.get(
         "/recordings",
         operation_id="list_recordings",
@@ -45,7 +45,7 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.RECORDINGS) | problems(Kind.NO_RECORDER, Kind.INVALID_REQUEST),
     )
     def list_recordings(request: Request) -> Response:
-        found = _required(site_of, request)
+        found = _required(request)
         files = [
             {"name": file.name, "bytes": file.size, "changed_ns": file.changed_ns, "finished": file.finished}
             for file in found.files()
@@ -53,7 +53,7 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         return json_response(_state(found) | {"files": files})
 
 
-def _add_start_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_start_route(router: APIRouter) -> None:
     @router.post(
         "/recordings",
         operation_id="start_recording",
@@ -68,7 +68,7 @@ def _add_start_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     def start_recording(
         wanted: Annotated[RecordingRequest, Body(examples=[{"tags": None}])], request: Request
     ) -> Response:
-        found = _required(site_of, request)
+        found = _required(request)
         with saving():
             found.prepare()
         if not found.start(wanted.tags):
@@ -78,7 +78,7 @@ def _add_start_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         return json_response(_state(found), status=201)
 
 
-def _add_stop_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_stop_route(router: APIRouter) -> None:
     @router.post(
         "/recordings/stop",
         operation_id="stop_recording",
@@ -89,13 +89,13 @@ def _add_stop_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         | problems(Kind.NO_RECORDER, Kind.RECORDS_NOTHING, Kind.INVALID_REQUEST),
     )
     def stop_recording(request: Request) -> Response:
-        found = _required(site_of, request)
+        found = _required(request)
         if not found.stop(FINISH_S):
             raise ProblemError(Kind.RECORDS_NOTHING, "No recording is running, so there is nothing to stop.")
         return json_response(_state(found) | {"file": found.open_name or found.ended_name})
 
 
-def _add_download_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_download_route(router: APIRouter) -> None:
     @router.get(
         "/recordings/{name}",
         operation_id="get_recording",
@@ -106,7 +106,7 @@ def _add_download_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         | problems(Kind.NO_RECORDER, Kind.UNKNOWN_RECORDING, Kind.RECORDING_UNFINISHED, Kind.INVALID_REQUEST),
     )
     def get_recording(name: FileName, request: Request) -> Response:
-        return _download(_opened(_required(site_of, request), name), name)
+        return _download(_opened(_required(request), name), name)
 
 
 def _opened(recorder: Recorder, name: str) -> BinaryIO:
@@ -143,8 +143,8 @@ def _chunks(file: BinaryIO, size: int) -> Iterator[bytes]:
             yield chunk
 
 
-def _required(site_of: SiteOfRequest, request: Request) -> Recorder:
-    recorder = site_of.parts(request).recorder
+def _required(request: Request) -> Recorder:
+    recorder = parts_of(request).recorder
     if recorder is None:
         raise ProblemError(Kind.NO_RECORDER, "Set `data_dir`, where the service stores recordings.")
     return recorder

@@ -14,7 +14,7 @@ from dropanchor_service.api.http.etags import etag_of, matches
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import NO_QUERY, TagId, example_response, json_response, saving
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import answers_of
 from dropanchor_service.api.routes.tags import remote_answer
 from dropanchor_service.store import Tag
 
@@ -31,14 +31,14 @@ _PATCH = {
 }
 
 
-def remote_settings_router(site_of: SiteOfRequest) -> APIRouter:
+def remote_settings_router() -> APIRouter:
     router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
-    _add_get_route(router, site_of)
-    _add_patch_route(router, site_of)
+    _add_get_route(router)
+    _add_patch_route(router)
     return router
 
 
-def _add_get_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_get_route(router: APIRouter) -> None:
     @router.get(
         "/tags/{tag}/remote-settings",
         operation_id="get_remote_settings",
@@ -47,11 +47,11 @@ def _add_get_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.REMOTE_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
     )
     async def get_remote_settings(tag: TagId, request: Request) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         return _response(answers, known_tag(answers, tag))
 
 
-def _add_patch_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_patch_route(router: APIRouter) -> None:
     @router.patch(
         "/tags/{tag}/remote-settings",
         operation_id="patch_remote_settings",
@@ -70,7 +70,7 @@ def _add_patch_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         request: Request,
         if_match: Annotated[str | None, Header()] = None,
     ) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         known = known_tag(answers, tag)
         _change(answers, known, patch, if_match)
         return _response(answers, known)

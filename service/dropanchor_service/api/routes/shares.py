@@ -12,8 +12,9 @@ from dropanchor_schemas.shares import NewShare, Share, ShareList, ShareRequest
 from dropanchor_service.api.http.behind_proxy import prefix_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
-from dropanchor_service.security.share_links import MAX_LINKS, ShareLinks, TooManyLinksError
+from dropanchor_service.api.routes.shared_parts import shared_of
+from dropanchor_service.api.routes.site_of_request import parts_of, sites_of
+from dropanchor_service.security.share_links import MAX_LINKS, ShareLinks, TooManyLinksError, share_links_of
 
 _EXAMPLE: dict[str, Any] = {
     "id": "3f9a1c5e7b20d846",
@@ -31,16 +32,15 @@ scope `read`. A link of a tag or a group reads these tags, the site and nothing 
 in its data folder."""
 
 
-def shares_router(site_of: SiteOfRequest, links: ShareLinks | None) -> APIRouter:
-    """Return the routes. links: None without access control, with which everybody sees everything anyway."""
+def shares_router() -> APIRouter:
     router = APIRouter(tags=["shares"], dependencies=[NO_QUERY])
-    _add_list_route(router, site_of, links)
-    _add_create_route(router, site_of, links)
-    _add_revoke_route(router, site_of, links)
+    _add_list_route(router)
+    _add_create_route(router)
+    _add_revoke_route(router)
     return router
 
 
-def _add_list_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLinks | None) -> None:
+def _add_list_route(router: APIRouter) -> None:
     @router.get(
         "/shares",
         operation_id="list_shares",
@@ -49,12 +49,12 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLinks
         responses=example_response({"available": True, "shares": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
     )
     async def list_shares(request: Request) -> Response:
-        site = site_of.parts(request).id
+        site, links = parts_of(request).id, _links_of(request)
         shares: Sequence[Share] = [] if links is None else links.of_site(site)
         return json_response({"available": links is not None, "shares": [share.model_dump() for share in shares]})
 
 
-def _add_create_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLinks | None) -> None:
+def _add_create_route(router: APIRouter) -> None:
     @router.post(
         "/shares",
         operation_id="create_share",
@@ -68,7 +68,7 @@ def _add_create_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLin
     def create_share(
         body: Annotated[ShareRequest, Body(examples=[{"name": "Visitors"}])], request: Request
     ) -> Response:
-        site = site_of.parts(request).id
+        site, links = parts_of(request).id, _links_of(request)
         if links is None:
             raise _no_access_control()
         try:
@@ -78,11 +78,16 @@ def _add_create_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLin
             raise ProblemError(
                 Kind.ITEMS_FULL, say("shares_full", "There are {n} share links: revoke some.", n=MAX_LINKS)
             ) from error
-        page = prefix_of(request) + ("/" if site_of.only else f"/?site={quote(site, safe='')}")
+        page = prefix_of(request) + ("/" if sites_of(request).only else f"/?site={quote(site, safe='')}")
         view = f"{body.view}&" if body.view else ""
         return json_response(
             share.model_dump() | {"secret": secret, "path": f"{page}#{view}share={secret}"}, status=201
         )
+
+
+def _links_of(request: Request) -> ShareLinks | None:
+    """Return the links; None without access control, with which everybody sees everything anyway."""
+    return share_links_of(shared_of(request).authenticator)
 
 
 def _no_access_control() -> ProblemError:
@@ -96,7 +101,7 @@ def _no_access_control() -> ProblemError:
     )
 
 
-def _add_revoke_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLinks | None) -> None:
+def _add_revoke_route(router: APIRouter) -> None:
     @router.delete(
         "/shares/{share}",
         operation_id="revoke_share",
@@ -107,7 +112,7 @@ def _add_revoke_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLin
     def revoke_share(
         share: Annotated[str, Path(description="The id of the link.", examples=[_EXAMPLE["id"]])], request: Request
     ) -> None:
-        site = site_of.parts(request).id
+        site, links = parts_of(request).id, _links_of(request)
         with saving():
             is_known = links is not None and links.revoke(site, share)
         if not is_known:

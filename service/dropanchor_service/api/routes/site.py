@@ -19,21 +19,21 @@ from dropanchor_service.api.routes.parameters import (
     resource_response,
     saving,
 )
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import answers_of
 
 _BAD_CHANGE = (Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED)
 
 
-def site_router(site_of: SiteOfRequest) -> APIRouter:
+def site_router() -> APIRouter:
     router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
-    _add_site_routes(router, site_of)
-    _add_anchor_routes(router, site_of)
-    _add_put_anchor_route(router, site_of)
-    _add_delete_anchor_route(router, site_of)
+    _add_site_routes(router)
+    _add_anchor_routes(router)
+    _add_put_anchor_route(router)
+    _add_delete_anchor_route(router)
     return router
 
 
-def _add_site_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_site_routes(router: APIRouter) -> None:
     @router.get(
         "/site",
         operation_id="get_site",
@@ -43,7 +43,7 @@ def _add_site_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.SITE) | problems(Kind.INVALID_REQUEST),
     )
     async def get_site(request: Request) -> Response:
-        return resource_response(site_of(request).site.site)
+        return resource_response(answers_of(request).site.site)
 
     @router.put(
         "/site",
@@ -57,13 +57,13 @@ def _add_site_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
     ) -> Response:
         with saving():
             try:
-                site_of(request).site.set_site(body, allows)
+                answers_of(request).site.set_site(body, allows)
             except ValueError as error:
                 raise ProblemError(Kind.SITE_ID_FIXED, said_by(error)) from error
         return resource_response(body)
 
 
-def _add_anchor_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_anchor_routes(router: APIRouter) -> None:
     @router.get(
         "/anchors",
         operation_id="list_anchors",
@@ -72,7 +72,7 @@ def _add_anchor_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response({"anchors": [examples.ANCHOR]}) | problems(Kind.INVALID_REQUEST),
     )
     async def list_anchors(request: Request) -> Response:
-        anchors = site_of(request).site.site.anchors
+        anchors = answers_of(request).site.site.anchors
         return json_response({"anchors": [anchor.model_dump() for anchor in anchors]})
 
     @router.get(
@@ -84,13 +84,13 @@ def _add_anchor_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.ANCHOR) | problems(Kind.UNKNOWN_ANCHOR, Kind.INVALID_REQUEST),
     )
     async def get_anchor(anchor: AnchorId, request: Request) -> Response:
-        known = site_of(request).site.anchor(anchor)
+        known = answers_of(request).site.anchor(anchor)
         if known is None:
             raise _unknown(anchor)
         return resource_response(known)
 
 
-def _add_put_anchor_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_put_anchor_route(router: APIRouter) -> None:
     @router.put(
         "/anchors/{anchor}",
         operation_id="put_anchor",
@@ -116,11 +116,11 @@ def _add_put_anchor_route(router: APIRouter, site_of: SiteOfRequest) -> None:
                 ),
             )
         with saving():
-            site_of(request).site.set_anchor(body, allows)
+            answers_of(request).site.set_anchor(body, allows)
         return resource_response(body)
 
 
-def _add_delete_anchor_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_delete_anchor_route(router: APIRouter) -> None:
     @router.delete(
         "/anchors/{anchor}",
         operation_id="delete_anchor",
@@ -131,7 +131,7 @@ def _add_delete_anchor_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     def delete_anchor(anchor: AnchorId, allows: Conditions, request: Request) -> Response:
         with saving():
             try:
-                site_of(request).site.remove_anchor(anchor, allows)
+                answers_of(request).site.remove_anchor(anchor, allows)
             except KeyError as error:
                 raise _unknown(anchor) from error
         return Response(status_code=204)

@@ -1,8 +1,11 @@
-"""Find the site that a request is about: the one in its path, or the only one."""
+"""Find the site that a request is about: the one in its path, or the only one.
+
+Routes know neither sites nor applications: `create_app_of` puts the sites into the state of the application.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from threading import Lock
-from typing import Annotated, Generic, TypeVar
+from typing import Annotated, Any, Generic, TypeVar
 
 from fastapi import Path
 from fastapi.dependencies.utils import get_dependant
@@ -29,22 +32,20 @@ async def _describe_site(
 SITE_IN_PATH = get_dependant(path=SITE_PREFIX, call=_describe_site)
 
 
-class SiteOfRequest:
-    """Returns the answers of the site that a request is about, or with `parts` all that its routes work on."""
+class SitesOfApp:
+    """What the routes of each site of an application work on."""
 
     def __init__(self, parts: Sequence[SiteParts]) -> None:
         self._parts = {one.id: one for one in parts}
         self.only = parts[0] if len(parts) == 1 else None
+        self._kept: dict[tuple[object, str], Any] = {}
+        self._lock = Lock()
 
     def __len__(self) -> int:
         return len(self._parts)
 
     def __iter__(self) -> Iterator[SiteParts]:
         return iter(self._parts.values())
-
-    def __call__(self, connection: HTTPConnection) -> Answers:
-        """Raises ProblemError; see `parts`."""
-        return self.parts(connection).answers
 
     def parts(self, connection: HTTPConnection) -> SiteParts:
         """Return the parts of the site in the path, or of that of a tag's key, or of the only one.
@@ -59,6 +60,14 @@ class SiteOfRequest:
         if found is None:
             raise ProblemError(Kind.UNKNOWN_SITE, f"There is no site {name!r}. /api/v1/sites lists the sites.")
         return found
+
+    def kept(self, make: Callable[[SiteParts], T], parts: SiteParts) -> T:
+        """Return what `make` has made of a site: it is called once."""
+        with self._lock:
+            if (make, parts.id) not in self._kept:
+                self._kept[make, parts.id] = make(parts)
+            made: T = self._kept[make, parts.id]
+            return made
 
     def members(self, site: str | None, group: str) -> list[str]:
         """Return the tags of a group of a site; None: of the only one."""
@@ -79,19 +88,28 @@ class SiteOfRequest:
         return self.only
 
 
+def sites_of(connection: HTTPConnection) -> SitesOfApp:
+    """Return all sites of the application that a request came to."""
+    sites: SitesOfApp = connection.app.state.sites
+    return sites
+
+
+def parts_of(connection: HTTPConnection) -> SiteParts:
+    """Return what the routes of the site of a request work on. Raises ProblemError; see `SitesOfApp.parts`."""
+    return sites_of(connection).parts(connection)
+
+
+def answers_of(connection: HTTPConnection) -> Answers:
+    """Raises ProblemError; see `SitesOfApp.parts`."""
+    return parts_of(connection).answers
+
+
 class ForEachSite(Generic[T]):
     """What a route keeps for each site, made when the first request needs it."""
 
-    def __init__(self, site_of: SiteOfRequest, make: Callable[[SiteParts], T]) -> None:
-        self._site_of = site_of
+    def __init__(self, make: Callable[[SiteParts], T]) -> None:
         self._make = make
-        self._made: dict[str, T] = {}
-        self._lock = Lock()
 
     def __call__(self, connection: HTTPConnection) -> T:
-        """Return that of the site of a request. Raises ProblemError; see `SiteOfRequest.parts`."""
-        parts = self._site_of.parts(connection)
-        with self._lock:
-            if parts.id not in self._made:
-                self._made[parts.id] = self._make(parts)
-            return self._made[parts.id]
+        """Return that of the site of a request. Raises ProblemError; see `SitesOfApp.parts`."""
+        return sites_of(connection).kept(self._make, parts_of(connection))

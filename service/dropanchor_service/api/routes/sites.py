@@ -18,16 +18,16 @@ from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.below import below
 from dropanchor_service.api.routes.parameters import NO_QUERY, PoseQuery, example_response, json_response
 from dropanchor_service.api.routes.poses import in_pieces
-from dropanchor_service.api.routes.site_of_request import SITE_IN_PATH, SITE_PREFIX, SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import SITE_IN_PATH, SITE_PREFIX, sites_of
 from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.security.identity import Scope
 
 
-def sites_router(site_of: SiteOfRequest, routers: Iterable[APIRouter]) -> APIRouter:
+def sites_router(routers: Iterable[APIRouter]) -> APIRouter:
     """Return the list of the sites, and below the id of each site the routes of these routers."""
     router = APIRouter()
-    _add_list_route(router, site_of)
-    _add_poses_route(router, site_of)
+    _add_list_route(router)
+    _add_poses_route(router)
     for routes in routers:
         of_site = below(SITE_PREFIX, routes.routes)
         for route in of_site:
@@ -53,7 +53,7 @@ def _with_unknown_site(responses: dict[int | str, dict[str, Any]]) -> dict[int |
     return responses | {404: unknown | {"description": f"{unknown['description']} {others}".rstrip()}}
 
 
-def _add_list_route(router: APIRouter, sites: SiteOfRequest) -> None:
+def _add_list_route(router: APIRouter) -> None:
     @router.get(
         "/sites",
         operation_id="list_sites",
@@ -64,11 +64,11 @@ def _add_list_route(router: APIRouter, sites: SiteOfRequest) -> None:
         dependencies=[NO_QUERY],
     )
     def list_sites(request: Request) -> Response:
-        wanted = {one.id for one in _readable(sites, request)}
-        return json_response({"sites": list(summaries([one.answers for one in sites], wanted))})
+        wanted = {one.id for one in _readable(request)}
+        return json_response({"sites": list(summaries([one.answers for one in sites_of(request)], wanted))})
 
 
-def _add_poses_route(router: APIRouter, sites: SiteOfRequest) -> None:
+def _add_poses_route(router: APIRouter) -> None:
     @router.get(
         "/sites/poses",
         operation_id="list_poses_of_sites",
@@ -79,16 +79,16 @@ def _add_poses_route(router: APIRouter, sites: SiteOfRequest) -> None:
         | problems(Kind.INVALID_REQUEST),
     )
     async def list_poses_of_sites(query: Annotated[PoseQuery, Query()], request: Request) -> Response:
-        chunks = _poses_json(_readable(sites, request), query)
+        chunks = _poses_json(_readable(request), query)
         return StreamingResponse(
             in_pieces(chunks), media_type="application/json", headers={"cache-control": "no-store"}
         )
 
 
-def _readable(sites: SiteOfRequest, request: Request) -> list[SiteParts]:
+def _readable(request: Request) -> list[SiteParts]:
     """Return the sites that the client of a request may read."""
     scope_in = getattr(request.state, "scope_in", lambda _: Scope.ADMIN)  # without authentication
-    return [one for one in sites if scope_in(one.id) is not None]
+    return [one for one in sites_of(request) if scope_in(one.id) is not None]
 
 
 def _poses_json(sites: Sequence[SiteParts], query: PoseQuery) -> Iterator[bytes | memoryview]:

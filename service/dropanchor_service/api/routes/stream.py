@@ -20,7 +20,8 @@ from dropanchor_service.answers.pose_filter import PoseFilter
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import PoseQuery
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.shared_parts import shared_of
+from dropanchor_service.api.routes.site_of_request import parts_of
 
 Array = NDArray[Any]  # POSE rows of the store
 
@@ -48,7 +49,7 @@ Versions = Callable[[], Sequence[int]]
 """Returns numbers of which one grows with every change of settings."""
 
 
-def stream_router(site_of: SiteOfRequest, stopping: Event) -> APIRouter:
+def stream_router() -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -60,10 +61,10 @@ def stream_router(site_of: SiteOfRequest, stopping: Event) -> APIRouter:
         responses=_event_stream() | problems(Kind.INVALID_REQUEST),
     )
     async def stream_poses(query: Annotated[StreamQuery, Query()], request: Request) -> Response:
-        parts = site_of.parts(request)
+        parts = parts_of(request)
         answers, plans = parts.answers, parts.plans
         changes = Changes(answers, lambda: (answers.site.version, plans.version), query.tags, query.wanted)
-        events = _events(changes, 1 / query.max_hz, stopping)
+        events = _events(changes, 1 / query.max_hz, shared_of(request).stopping)
         headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
         return StreamingResponse(events, media_type=MEDIA_TYPE, headers=headers)
 

@@ -27,7 +27,7 @@ from dropanchor_service.api.routes.parameters import (
     saving,
 )
 from dropanchor_service.api.routes.shown_to_links import shown_to
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import answers_of, parts_of
 from dropanchor_service.store.clock_offsets import ClockOffset
 from dropanchor_service.store.preconditions import Precondition
 from dropanchor_service.store.tags import KINDS, REASONS, Tag
@@ -35,23 +35,23 @@ from dropanchor_service.store.tags import KINDS, REASONS, Tag
 _REASON_NAMES = [reason.value for reason in REASONS]
 
 
-def tags_router(site_of: SiteOfRequest) -> APIRouter:
+def tags_router() -> APIRouter:
     router = APIRouter(tags=["tags"])
-    _add_list_route(router, site_of)
+    _add_list_route(router)
     return router
 
 
-def tag_router(site_of: SiteOfRequest) -> APIRouter:
+def tag_router() -> APIRouter:
     router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
-    _add_pending_routes(router, site_of)
-    _add_status_route(router, site_of)
-    _add_get_settings_route(router, site_of)
-    _add_put_settings_route(router, site_of)
-    _add_delete_route(router, site_of)
+    _add_pending_routes(router)
+    _add_status_route(router)
+    _add_get_settings_route(router)
+    _add_put_settings_route(router)
+    _add_delete_route(router)
     return router
 
 
-def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_list_route(router: APIRouter) -> None:
     @router.get(
         "/tags",
         operation_id="list_tags",
@@ -60,7 +60,7 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.TAG_LIST) | problems(Kind.INVALID_REQUEST),
     )
     def list_tags(query: Annotated[TagFilter, Query()], request: Request) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         now_ns = answers.now_ns()
         offsets = answers.clock_offsets.clock_offsets(now_ns)
         wanted = set(query.tags)
@@ -69,7 +69,7 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         return json_response({"t_ns": now_ns, "tags": list(map(show, _statuses(answers, tags, offsets, now_ns)))})
 
 
-def _add_pending_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_pending_routes(router: APIRouter) -> None:
     @router.get(
         "/pending-tags",
         operation_id="list_pending_tags",
@@ -81,7 +81,7 @@ def _add_pending_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.PENDING_TAG_LIST) | problems(Kind.INVALID_REQUEST),
     )
     def list_pending_tags(request: Request) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         return json_response({"t_ns": answers.now_ns(), "tags": _pending(answers)})
 
     @router.get(
@@ -93,11 +93,11 @@ def _add_pending_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.NEWCOMER_LIST) | problems(Kind.INVALID_REQUEST),
     )
     def list_newcomers(request: Request) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         return json_response({"t_ns": answers.now_ns(), "newcomers": _pending(answers)})
 
 
-def _add_status_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_status_route(router: APIRouter) -> None:
     @router.get(
         "/tags/{tag}",
         operation_id="get_tag",
@@ -106,14 +106,14 @@ def _add_status_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(_timed(examples.TAG)) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
     )
     async def get_tag(tag: TagId, request: Request) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         known, now_ns = known_tag(answers, tag), answers.now_ns()
         offset = answers.clock_offsets.clock_offset(known.row, now_ns)
         status = next(_statuses(answers, [known], {known.row: offset}, now_ns))
         return json_response(_timed(shown_to(request)(status)))
 
 
-def _add_get_settings_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_get_settings_route(router: APIRouter) -> None:
     @router.get(
         "/tags/{tag}/settings",
         operation_id="get_tag_settings",
@@ -122,11 +122,11 @@ def _add_get_settings_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.TAG_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
     )
     async def get_tag_settings(tag: TagId, request: Request) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         return resource_response(answers.site.tag_settings(known_tag(answers, tag).name))
 
 
-def _add_put_settings_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_put_settings_route(router: APIRouter) -> None:
     @router.put(
         "/tags/{tag}/settings",
         operation_id="put_tag_settings",
@@ -144,13 +144,13 @@ def _add_put_settings_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         allows: Conditions,
         request: Request,
     ) -> Response:
-        parts = site_of.parts(request)
+        parts = parts_of(request)
         answers = parts.answers
         register_tag(answers, tag, settings, parts.max_tags, allows)
         return resource_response(answers.site.tag_settings(tag))
 
 
-def _add_delete_route(router: APIRouter, site_of: SiteOfRequest) -> None:
+def _add_delete_route(router: APIRouter) -> None:
     @router.delete(
         "/tags/{tag}",
         operation_id="delete_tag",
@@ -163,7 +163,7 @@ def _add_delete_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=problems(Kind.UNKNOWN_TAG, Kind.CHANGED_MEANWHILE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
     )
     def delete_tag(tag: TagId, allows: Conditions, request: Request) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         known = known_tag(answers, tag)
         with saving():
             answers.site.remove_tag(known.name, answers.now_ns(), allows)

@@ -19,7 +19,7 @@ from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.contents import TEXT, schema_of
 from dropanchor_service.api.routes.parameters import TagId
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import answers_of
 from dropanchor_service.history.errors import HistoryError
 
 MAX_POSES = 10_000
@@ -65,7 +65,7 @@ CONTENT: dict[str, Any] = {
 """The media types of a track in the OpenAPI document."""
 
 
-def track_router(site_of: SiteOfRequest) -> APIRouter:
+def track_router() -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -81,7 +81,7 @@ def track_router(site_of: SiteOfRequest) -> APIRouter:
         ),
     )
     def get_track(tag: TagId, query: Annotated[TrackQuery, Query()], request: Request) -> Response:
-        answers, form = site_of(request), track_formats.negotiate(request, query.format)
+        answers, form = answers_of(request), track_formats.negotiate(request, query.format)
         if form in track_formats.GEOREFERENCED:
             geojson.require_georeference(answers, track_formats.GEOREFERENCED[form])
         from_ns, to_ns = limits_of(query, answers.now_ns())

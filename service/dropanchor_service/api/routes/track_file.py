@@ -17,7 +17,7 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import TagId
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import answers_of
 from dropanchor_service.api.routes.track import CONTENT
 from dropanchor_service.history.errors import HistoryError
 
@@ -40,7 +40,7 @@ class FileQuery(Period):
     )
 
 
-def track_file_router(site_of: SiteOfRequest) -> APIRouter:
+def track_file_router() -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -56,7 +56,7 @@ def track_file_router(site_of: SiteOfRequest) -> APIRouter:
         ),
     )
     def export_track(tag: TagId, query: Annotated[FileQuery, Query()], request: Request) -> StreamingResponse:
-        answers = site_of(request)
+        answers = answers_of(request)
         if query.format in track_formats.GEOREFERENCED:
             geojson.require_georeference(answers, track_formats.GEOREFERENCED[query.format])
         to_parquet = _parquet() if query.format == PARQUET else None

@@ -12,7 +12,7 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import TagFilter, example_response, json_response
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, unreadable
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import answers_of
 from dropanchor_service.history.errors import HistoryError, TooMuchError
 
 _DESCRIPTION = """\
@@ -27,7 +27,7 @@ class TracksQuery(TagFilter, Period):
     max_points: int = Field(default=300, ge=2, le=5000, description="The maximum number of points of a tag.")
 
 
-def tracks_router(site_of: SiteOfRequest) -> APIRouter:
+def tracks_router() -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -40,7 +40,7 @@ def tracks_router(site_of: SiteOfRequest) -> APIRouter:
         | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
     )
     def get_tracks(query: Annotated[TracksQuery, Query()], request: Request) -> Response:
-        answers = site_of(request)
+        answers = answers_of(request)
         from_ns, to_ns = limits_of(query, answers.now_ns())
         tracks = history_of(answers)
         try:

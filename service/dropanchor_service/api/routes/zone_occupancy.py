@@ -8,10 +8,10 @@ from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import parts_of
 
 
-def zone_occupancy_router(site_of: SiteOfRequest) -> APIRouter:
+def zone_occupancy_router() -> APIRouter:
     router = APIRouter(tags=["zones"], dependencies=[NO_QUERY])
 
     @router.get(
@@ -24,7 +24,7 @@ def zone_occupancy_router(site_of: SiteOfRequest) -> APIRouter:
         responses=example_response(examples.OCCUPANCY) | problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE),
     )
     def get_zone_occupancy(request: Request) -> Response:
-        parts = site_of.parts(request).events
+        parts = parts_of(request).events
         with reading():
             counts = parts.store.occupancy()
         known = parts.items.zones.all

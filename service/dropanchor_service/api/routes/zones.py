@@ -8,20 +8,20 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, at
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.item_routes import Resource, add_item_routes
 from dropanchor_service.api.routes.parameters import NO_QUERY
-from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_of_request import parts_of
 from dropanchor_service.zones.shapes import ShapeError, vertices_of
 
 
-def zones_router(site_of: SiteOfRequest) -> APIRouter:
+def zones_router() -> APIRouter:
     router = APIRouter(tags=["zones"], dependencies=[NO_QUERY])
-    add_item_routes(router, _zones(site_of))
-    add_item_routes(router, _rules(site_of))
+    add_item_routes(router, _zones())
+    add_item_routes(router, _rules())
     return router
 
 
-def _zones(site_of: SiteOfRequest) -> Resource[Zone]:
+def _zones() -> Resource[Zone]:
     return Resource(
-        lambda request: site_of.parts(request).events.items.zones,
+        lambda request: parts_of(request).events.items.zones,
         path="zones",
         name="zone",
         list_summary="List the zones",
@@ -36,9 +36,9 @@ def _zones(site_of: SiteOfRequest) -> Resource[Zone]:
     )
 
 
-def _rules(site_of: SiteOfRequest) -> Resource[EventRule]:
+def _rules() -> Resource[EventRule]:
     return Resource(
-        lambda request: site_of.parts(request).events.items.rules,
+        lambda request: parts_of(request).events.items.rules,
         path="event-rules",
         name="rule",
         list_summary="List the rules without a zone",

@@ -9,7 +9,6 @@ import itertools
 import sqlite3
 import time
 from dataclasses import dataclass
-from threading import Event
 from typing import Any
 
 from fastapi import APIRouter
@@ -17,16 +16,16 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from dropanchor_service.answers.answers import to_json
 from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, identify
-from dropanchor_service.api.http.connections import OpenConnections, TooManyConnectionsError
+from dropanchor_service.api.http.connections import TooManyConnectionsError
 from dropanchor_service.api.http.errors import ProblemError
-from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.omlox.feed.messages import Code, FeedError, Request, params_of, request_of
 from dropanchor_service.api.omlox.feed.topics import Feed, feed_of
 from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.hub_of_request import hub_of
 from dropanchor_service.api.omlox.routes.providers import TAKES_NO_POSITIONS
+from dropanchor_service.api.routes.shared_parts import SharedParts, shared_of
 from dropanchor_service.api.routes.stream import stopped_within
-from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
+from dropanchor_service.security.identity import Identity, UnauthenticatedError
 
 PERIOD_S = 0.1
 PAUSE_PER_WORK = 3.0  # so a connection takes at most a quarter of a core
@@ -41,14 +40,6 @@ _AUTHENTICATE = (
 
 
 @dataclass(frozen=True)
-class Doorkeeper:
-    """Who may connect. authenticator: None when every client may."""
-
-    authenticator: Authenticator | None
-    rate_limiter: RateLimiter | None
-
-
-@dataclass(frozen=True)
 class Subscription:
     """identity: who has subscribed; None without authentication."""
 
@@ -57,18 +48,17 @@ class Subscription:
     identity: Identity | None
 
 
-def feed_router(doorkeeper: Doorkeeper, stopping: Event) -> APIRouter:
-    """Return the router of the WebSocket. stopping: ends the connections when set."""
-    router, connections = APIRouter(), OpenConnections(CONNECTIONS_PER_CLIENT)
-    numbers = itertools.count(1)
+def feed_router() -> APIRouter:
+    """Return the router of the WebSocket."""
+    router, numbers = APIRouter(), itertools.count(1)
 
     @router.websocket("/ws/socket")
     async def serve(socket: WebSocket) -> None:
         await socket.accept()
-        client = client_of(socket, None)
+        client, shared = client_of(socket, None), shared_of(socket)
         try:
-            with connections.one_more(client):
-                await Connection(socket, hub_of(socket), doorkeeper, numbers).serve(stopping)
+            with shared.feed_connections.one_more(client, CONNECTIONS_PER_CLIENT):
+                await Connection(socket, hub_of(socket), shared, numbers).serve()
         except ProblemError:
             await socket.close(UNKNOWN_SITE, "There is no site with this id.")
         except TooManyConnectionsError:
@@ -80,19 +70,19 @@ def feed_router(doorkeeper: Doorkeeper, stopping: Event) -> APIRouter:
 class Connection:
     """One client. numbers: of subscriptions, of all connections together."""
 
-    def __init__(self, socket: WebSocket, hub: Hub, doorkeeper: Doorkeeper, numbers: "itertools.count[int]") -> None:
+    def __init__(self, socket: WebSocket, hub: Hub, shared: SharedParts, numbers: "itertools.count[int]") -> None:
         self._socket = socket
         self._hub = hub
-        self._doorkeeper = doorkeeper
+        self._shared = shared
         self._numbers = numbers
         self._subscriptions: dict[int, Subscription] = {}
         self._sending = asyncio.Lock()
 
-    async def serve(self, stopping: Event) -> None:
+    async def serve(self) -> None:
         """Serve the client until it is gone."""
         try:
             async with asyncio.TaskGroup() as tasks:
-                news = tasks.create_task(self._send_news(stopping))
+                news = tasks.create_task(self._send_news())
                 await self._answer_requests()
                 news.cancel()
         except* WebSocketDisconnect:
@@ -137,7 +127,7 @@ class Connection:
         return {"event": "unsubscribed", "topic": ended.topic, "subscription_id": request.subscription_id}
 
     async def _identity(self, token: str | None) -> Identity | None:
-        authenticator = self._doorkeeper.authenticator
+        authenticator = self._shared.authenticator
         if authenticator is None:
             return None
         secret = token or bearer_of(self._socket)
@@ -155,15 +145,15 @@ class Connection:
 
     async def _wait_for_turn(self) -> None:
         """Wait until the rate limit allows another message."""
-        limiter, client = self._doorkeeper.rate_limiter, client_of(self._socket, None)
-        if limiter is None or (self._doorkeeper.authenticator is None and client == LOOPBACK):
+        limiter, client = self._shared.rate_limiter, client_of(self._socket, None)
+        if limiter is None or (self._shared.authenticator is None and client == LOOPBACK):
             return
         while wait_s := limiter.wait_s(client):
             await asyncio.sleep(wait_s)
 
-    async def _send_news(self, stopping: Event) -> None:
+    async def _send_news(self) -> None:
         pause_s = PERIOD_S
-        while not await stopped_within(pause_s, stopping):
+        while not await stopped_within(pause_s, self._shared.stopping):
             if not self._subscriptions:
                 continue
             began_s = time.monotonic()
@@ -199,7 +189,7 @@ class Connection:
 
     def _require_valid(self, subscription: Subscription) -> None:
         """Raise FeedError once the key of a subscription is revoked, or its token has expired."""
-        authenticator, identity = self._doorkeeper.authenticator, subscription.identity
+        authenticator, identity = self._shared.authenticator, subscription.identity
         if authenticator is not None and identity is not None and not authenticator.is_still_valid(identity):
             raise FeedError(
                 Code.NOT_AUTHENTICATED, f"This subscription ends: the {identity.source} was revoked or has expired."
