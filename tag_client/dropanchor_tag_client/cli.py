@@ -69,7 +69,7 @@ or a samples message of the protocol:
   {"range": [{"t_ns": 1760000000000000000, "anchor": 1, "range_m": 3.21}]}
 
 Without t_ns, a sample gets the time at which its line is read. A bad line is reported with its number and skipped; the
-exit code is then 1.
+exit code is then 1, as it is when nobody receives the samples.
 examples:
   my_uwb_reader | dropanchor-tag publish --tag cart
   my_uwb_reader | dropanchor-tag publish --credentials cart/      with the folder from `dropanchor tag add cart`

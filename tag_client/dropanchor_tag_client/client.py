@@ -26,12 +26,13 @@ from dropanchor_schemas.wire import (
 )
 from dropanchor_tag_client.buffer import SampleBuffer, rejection_reason
 from dropanchor_tag_client.calibration import Calibration
+from dropanchor_tag_client.credentials import connection_of
 from dropanchor_tag_client.health import HealthValues, reportable
 from dropanchor_tag_client.link import TagKeys
 from dropanchor_tag_client.publisher import Publisher, declare_publisher
 from dropanchor_tag_client.remote import Decimator, RemoteSettings
 from dropanchor_tag_client.sample_methods import SampleMethods
-from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, open_session
+from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, SharedSession, open_session
 
 if TYPE_CHECKING:
     from dropanchor_tag_client.spooling import SpoolCounts, SpoolingPublisher
@@ -53,7 +54,7 @@ class TagClient(SampleMethods):
     """Publish the raw samples of one tag. Use the client as a context manager. All methods are thread-safe.
 
     connect: the endpoint of the router; `SessionSettings` (TLS, password); or an open session, which several tags of
-        one process can share and which the client does not close.
+        one process can share and which the client does not close. Credentials of another tag raise OtherTagError.
     clock: what `t_ns` counts from: "utc" (1970) or "boot" (any start that is fixed until `boot_id` changes).
     batch_samples, batch_s: the client sends a message when it has this many samples, or when its first sample is this
         old. With batch_s=None no thread watches the time: call `flush`.
@@ -84,7 +85,7 @@ class TagClient(SampleMethods):
         tag: str,
         *,
         site: str = "default",
-        connect: str | SessionSettings | zenoh.Session = DEFAULT_CONNECT,
+        connect: str | SessionSettings | SharedSession | zenoh.Session = DEFAULT_CONNECT,
         encoding: Literal["packed", "json"] = "packed",
         clock: Literal["utc", "boot"] = "utc",
         batch_samples: int = 20,
@@ -106,8 +107,8 @@ class TagClient(SampleMethods):
         self.tag = tag
         self.boot_id = int.from_bytes(os.urandom(4), "little") or 1
         self.refused: Counter[Reason] = Counter()
-        self._keys = TagKeys.of(site, tag)
-        self._connect = SessionSettings(connect=connect) if isinstance(connect, str) else connect
+        self.keys = TagKeys.of(site, tag)
+        self._connect = connection_of(connect, site, tag)
         self._packed = encoding == "packed"
         self._calibration = calibration
         self._boot_clock = clock == "boot"
@@ -143,7 +144,7 @@ class TagClient(SampleMethods):
             else:
                 self._session = self._connect
             self._publisher = self._declare_publisher(self._session)
-            self._token = self._session.liveliness().declare_token(self._keys.alive)
+            self._token = self._session.liveliness().declare_token(self.keys.alive)
         if self._batch_s is not None:
             self._timer = threading.Thread(target=self._flush_when_due, name=f"flush {self.tag}", daemon=True)
             self._timer.start()
@@ -173,7 +174,7 @@ class TagClient(SampleMethods):
             report, session = reportable(values, self.spool_counts, self._applied, self.refused), self.session
             if session is None or not report:
                 return False
-            session.put(self._keys.health, encode_health(report), encoding=ENCODING_JSON)
+            session.put(self.keys.health, encode_health(report), encoding=ENCODING_JSON)
         return True
 
     def apply(self, settings: RemoteSettings) -> None:
@@ -201,11 +202,6 @@ class TagClient(SampleMethods):
         return self._sent
 
     @property
-    def settings_key(self) -> str:
-        """Return the key where the service has settings for this tag."""
-        return self._keys.settings
-
-    @property
     def session(self) -> zenoh.Session | None:
         """Return the session of the open client; with a spool, None until it is connected."""
         if self._publisher is None:
@@ -225,7 +221,7 @@ class TagClient(SampleMethods):
         return SpoolingPublisher(
             Spool(folder, self._spool_limit_bytes),
             self._connect,
-            self._keys,
+            self.keys,
             self._declare_publisher,
             self._cache_messages,
             "" if self._calibration is None else f";{self._calibration.label}",
@@ -237,7 +233,7 @@ class TagClient(SampleMethods):
             encoding += f";{self._calibration.label}"
         return declare_publisher(
             session,
-            self._keys.samples,
+            self.keys.samples,
             encoding,
             cache_messages=self._cache_messages,
             wait_when_congested=self._wait_when_congested,

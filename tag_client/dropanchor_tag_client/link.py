@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Self
 import zenoh
 
 from dropanchor_schemas import keys
+from dropanchor_tag_client.reception import Reception
 from dropanchor_tag_client.reminders import Reminders
 from dropanchor_tag_client.session import ConnectError, SessionSettings, open_session
 
@@ -48,14 +49,13 @@ class Link:
         self._pose_key = tag_keys.pose
         self._owned = owned
         self._publisher = declare(session)
-        self._matching = session.declare_publisher(tag_keys.samples)  # an advanced publisher does not know its match
+        self._reception = Reception(session, tag_keys.samples)
         self._token = session.liveliness().declare_token(tag_keys.alive)
 
     @property
     def has_subscriber(self) -> bool:
         """Return whether the router is connected and somebody subscribes to the samples."""
-        status: Any = self._matching.matching_status
-        return bool(status.matching)
+        return self._reception.has_subscriber
 
     def put(self, payload: bytes, encoding: str) -> None:
         self._publisher.put(payload, encoding=encoding)
@@ -70,7 +70,7 @@ class Link:
 
     def close(self) -> None:
         self._token.undeclare()
-        self._matching.undeclare()
+        self._reception.close()
         self._publisher.undeclare()
         if self._owned:
             self.session.close()

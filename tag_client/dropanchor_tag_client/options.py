@@ -3,19 +3,19 @@
 import argparse
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
-
-import zenoh
 
 from dropanchor_tag_client.calibration import Calibration, CalibrationError, read_calibration
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.credentials import read_credentials
 from dropanchor_tag_client.health import HealthValues
 from dropanchor_tag_client.host import host_health, program
-from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, open_session
+from dropanchor_tag_client.reception import WHAT_TO_CHECK, Reception
+from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, SharedSession, open_session
 from dropanchor_tag_client.upkeep import Upkeep
 
 PASSWORD_VARIABLE = "DROPANCHOR_PASSWORD"
@@ -176,13 +176,28 @@ def _health(replay: bool) -> HealthValues:
     return values
 
 
-@contextmanager
-def opened_session(arguments: argparse.Namespace) -> Iterator[zenoh.Session]:
-    """Open one session for many tags. Ctrl-C while it connects exits immediately."""
-    with _interruptible():
-        session = open_session(session_settings(arguments), arguments.connect_timeout)
+def is_received(client: TagClient) -> bool:
+    """Say so if nobody receives the samples of an open client that has no spool, and return whether somebody does."""
+    if client.session is None or client.spool_counts is not None:
+        return True
+    reception = Reception(client.session, client.keys.samples)
     try:
-        yield session
+        received = reception.wait()
+    finally:
+        reception.close()
+    if not received:
+        sys.stderr.write(f"nobody receives the samples of {client.tag}: {WHAT_TO_CHECK}\n")
+    return received
+
+
+@contextmanager
+def opened_session(arguments: argparse.Namespace) -> Iterator[SharedSession]:
+    """Open one session for many tags. Ctrl-C while it connects exits immediately."""
+    settings = session_settings(arguments)
+    with _interruptible():
+        session = open_session(settings, arguments.connect_timeout)
+    try:
+        yield SharedSession(session, settings)
     finally:
         session.close()
 

@@ -5,7 +5,7 @@ import logging
 import math
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import zenoh
 
@@ -60,6 +60,13 @@ class SessionSettings:
                 raise ValueError(f"{name} is given, but {self.connect} is not a tls/ or quic/ endpoint")
             if path is not None and not Path(path).is_file():
                 raise ValueError(f"{name}: there is no file {path}")
+
+
+class SharedSession(NamedTuple):
+    """A session for many tags, and what it was opened with."""
+
+    session: zenoh.Session
+    settings: SessionSettings
 
 
 def open_session(settings: SessionSettings, timeout_s: float | None = None) -> zenoh.Session:

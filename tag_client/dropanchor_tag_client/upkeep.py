@@ -11,11 +11,15 @@ import zenoh
 
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.health import HealthValues
+from dropanchor_tag_client.reception import WHAT_TO_CHECK, Reception
+from dropanchor_tag_client.reminders import Reminders
 from dropanchor_tag_client.remote import RemoteSettings, parse
 
 PERIOD_S = 60.0
 _POLL_S = 1.0
 _ANSWER_S = 5.0
+_UNHEARD_S = 10.0  # a service that restarts is back by then
+_NAMED = 5
 
 _log = logging.getLogger(__name__)
 
@@ -40,6 +44,9 @@ class Upkeep:
         self._due_s: dict[TagClient, float] = {}
         self._subscribers: dict[TagClient, Any] = {}
         self._replies: dict[TagClient, Any] = {}
+        self._receptions: dict[TagClient, Reception] = {}
+        self._heard_s = time.monotonic()
+        self._reminders = Reminders()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="upkeep", daemon=True)
 
@@ -54,6 +61,8 @@ class Upkeep:
         self._thread.join()
         for subscriber in self._subscribers.values():
             subscriber.undeclare()
+        for reception in self._receptions.values():
+            reception.close()
 
     def _run(self) -> None:
         while not self._stop.wait(min(_POLL_S, self._period_s)):
@@ -61,6 +70,15 @@ class Upkeep:
                 for payload in self._received(client):
                     self._apply(client, payload)
             self._visit()
+            self._look_for_silence()
+
+    def _look_for_silence(self) -> None:
+        """Warn of tags whose samples nobody receives. A spool keeps them, and says so itself."""
+        unheard = [client.tag for client, one in self._receptions.items() if not one.has_subscriber]
+        if not unheard:
+            self._heard_s, self._reminders = time.monotonic(), Reminders()
+        elif time.monotonic() - self._heard_s > _UNHEARD_S and self._reminders.failed():
+            _log.warning("nobody receives the samples of %s: %s", ", ".join(unheard[:_NAMED]), WHAT_TO_CHECK)
 
     def _visit(self) -> None:
         now_s = time.monotonic()
@@ -78,9 +96,11 @@ class Upkeep:
         Channels take the answers. Zenoh would run a callback on a thread of its own, and the process would abort if it
         ended before that thread.
         """
-        key = client.settings_key
+        key = client.keys.settings
         if client not in self._subscribers:
             self._subscribers[client] = session.declare_subscriber(key, zenoh.handlers.RingChannel(1))
+            if client.spool_counts is None:
+                self._receptions[client] = Reception(session, client.keys.samples)
         self._replies[client] = session.get(key, zenoh.handlers.DefaultHandler(), timeout=_ANSWER_S)
 
     def _received(self, client: TagClient) -> Iterator[bytes]:

@@ -108,6 +108,7 @@ def test_ctrl_c_ends_a_client_that_is_still_connecting(recording: Path) -> None:
 
 
 def test_a_replay_reports_how_much_it_sent(router_endpoint: str, recording: Path) -> None:
-    done = python(*COMMAND, "replay", str(recording), "--connect", router_endpoint, "--speed", "0")
+    with listening(router_endpoint):
+        done = python(*COMMAND, "replay", str(recording), "--connect", router_endpoint, "--speed", "0")
     assert done.returncode == 0
     assert "1000 samples of" in done.stderr

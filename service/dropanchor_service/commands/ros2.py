@@ -104,7 +104,9 @@ def run(arguments: argparse.Namespace) -> int:
         mounted = mounting(arguments.forward, arguments.up)
         _say(f"connecting to the router of the ROS nodes at {arguments.ros_connect} (--ros-connect)")
         with ExitStack() as stack:
-            node = RosNode(stack.enter_context(opened_session(_ros_options(arguments))), arguments.domain, _NODE)
+            node = RosNode(
+                stack.enter_context(opened_session(_ros_options(arguments))).session, arguments.domain, _NODE
+            )
             reads = arguments.imu or arguments.range or arguments.pressure
             client = stack.enter_context(opened_client(arguments, arguments.tag)) if reads else None
             _bridge(arguments, node, client, mounted)

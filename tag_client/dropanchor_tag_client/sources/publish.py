@@ -16,6 +16,7 @@ from dropanchor_tag_client.options import (
     add_calibration_option,
     add_connection_options,
     add_spool_options,
+    is_received,
     opened_client,
 )
 
@@ -37,14 +38,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Raises ConnectError, ValueError. Returns 1 when lines were left out."""
+    """Raises ConnectError, ValueError. Returns 1 when lines were left out, or nobody receives them."""
     if arguments.tag is None:
         raise ValueError("whose samples are these? --tag says so, or --credentials")
     with opened_client(arguments, arguments.tag, clock=arguments.clock) as client:
         bad = publish_lines(client, sys.stdin.buffer, sys.stderr, clock=arguments.clock)
+        received = is_received(client)
     refused = sum(client.refused.values())
     sys.stderr.write(f"{client.sent.samples} samples sent, {bad} bad lines, {refused} samples left out\n")
-    return 1 if bad or refused else 0
+    return 1 if bad or refused or not received else 0
 
 
 def publish_lines(client: TagClient, lines: BinaryIO, errors: TextIO, *, clock: str = "utc") -> int:

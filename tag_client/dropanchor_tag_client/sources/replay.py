@@ -10,7 +10,7 @@ from operator import itemgetter
 from typing import Protocol
 
 from dropanchor_tag_client.client import TagClient
-from dropanchor_tag_client.options import add_connection_options, opened_client
+from dropanchor_tag_client.options import add_connection_options, is_received, opened_client
 from dropanchor_tag_client.progress import Progress
 from dropanchor_tag_client.recording import Recording, read_recording
 
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Raises RecordingError, ConnectError, ValueError."""
+    """Raises RecordingError, ConnectError, ValueError. Returns 1 when nobody receives the samples."""
     recording = read_recording(arguments.recording)
     for note in recording.notes:
         sys.stderr.write(f"{note}\n")
@@ -62,8 +62,9 @@ def run(arguments: argparse.Namespace) -> int:
             if not arguments.loop:
                 break
             t0_ns += round((last_s - first_s) * _NS_PER_S) + _NS_PER_S // 10
+        received = is_received(client)
     sys.stderr.write(f"{client.sent.samples} samples of {tag} in {client.sent.messages} messages\n")
-    return 0
+    return 0 if received else 1
 
 
 def replay(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.host import program
-from dropanchor_tag_client.options import add_connection_options, opened_session
+from dropanchor_tag_client.options import add_connection_options, is_received, opened_session
 from dropanchor_tag_client.simulator.live import YARD, Delivery, deliveries, simulation, tag_name
 from dropanchor_tag_client.simulator.perturbations import PERTURBATIONS, perturbed
 from dropanchor_tag_client.simulator.ranging import AnchorPlace
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Raises ConnectError, ValueError."""
+    """Raises ConnectError, ValueError. Returns 1 when nobody receives the samples."""
     models = sensors(arguments)
     if arguments.out is not None:
         return _write(arguments, models)
@@ -90,7 +90,7 @@ def _publish(arguments: argparse.Namespace, models: SensorModels) -> int:
         ]
         stack.enter_context(Upkeep(clients, lambda: {"firmware": program()}))
         publish_live(clients, arguments.scenario, arguments.seed, models, arguments.duration)
-    return 0
+        return 0 if is_received(clients[0]) else 1
 
 
 def publish_live(

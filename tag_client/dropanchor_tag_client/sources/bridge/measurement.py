@@ -16,6 +16,7 @@ class Drop(StrEnum):
     NOT_UNDERSTOOD = "not_understood"
     RETAINED = "retained"
     TAG_INVALID = "tag_invalid"
+    OTHER_TAG = "other_tag"
     TOO_MANY_TAGS = "too_many_tags"
     POSITION_ONLY = "position_only"
     DUPLICATE = "duplicate"

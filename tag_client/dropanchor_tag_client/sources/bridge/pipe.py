@@ -8,6 +8,7 @@ from typing import Any
 
 from dropanchor_schemas.keys import InvalidKeyError
 from dropanchor_tag_client.client import TagClient
+from dropanchor_tag_client.credentials import OtherTagError
 from dropanchor_tag_client.sources.bridge.measurement import Drop, Dropped, Format, Found, Measurement, Received
 from dropanchor_tag_client.sources.bridge.topics import matches
 from dropanchor_tag_client.sources.publish import BadLineError, publisher_of
@@ -100,6 +101,8 @@ class Bridge:
             return self._drop(Dropped(Drop.NOT_UNDERSTOOD, f"tag {found.tag}: {error}"))
         except InvalidKeyError as error:
             return self._drop(Dropped(Drop.TAG_INVALID, f"{found.tag!r}: {error}"))
+        except OtherTagError as error:
+            return self._drop(Dropped(Drop.OTHER_TAG, f"tag {found.tag}: {error}"))
         if client is None:
             return self._drop(Dropped(Drop.TOO_MANY_TAGS, f"tag {found.tag} is number {MAX_TAGS + 1}"))
         refused = Counter(client.refused)

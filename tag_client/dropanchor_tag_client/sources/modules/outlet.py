@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_tag_client.client import TagClient
+from dropanchor_tag_client.credentials import OtherTagError
 from dropanchor_tag_client.sources.axes import Mounting, UpAxis, direction
 from dropanchor_tag_client.sources.modules.report import Imu, Range, Report
 from dropanchor_tag_client.sources.modules.status_log import StatusLog
@@ -132,7 +133,11 @@ class ManyTags:
             if len(self._clients) >= MAX_TAGS:
                 self._log.add(f"the module has named {MAX_TAGS} tags; tag {tag} is left out")
                 return None
-            client = TagClient(self._prefix + tag, **self._options)
+            try:
+                client = TagClient(self._prefix + tag, **self._options)
+            except OtherTagError as error:
+                self._log.add(f"tag {tag} is left out: {error}")
+                return None
             client.open()
             self._clients[tag] = client
         return self._clients[tag]
