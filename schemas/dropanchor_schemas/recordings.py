@@ -10,7 +10,9 @@ class RecordingRequest(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    tags: list[Id] | None = Field(default=None, max_length=10_000, description="The tags to record; null for all tags.")
+    tags: list[Id] | None = Field(
+        default=None, max_length=10_000, description="The tags to record; null or empty: all."
+    )
 
 
 class RecordingState(BaseModel):

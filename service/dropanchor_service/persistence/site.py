@@ -79,7 +79,7 @@ class Persistence:
             if writer is not None:
                 self._opened.enter_context(writer)
         if self.recorder is not None and self._settings.recording.enabled:
-            self.recorder.start(self._settings.recording.tags or None)
+            self.recorder.start(self._settings.recording.tags)
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -128,7 +128,7 @@ class Recorder:
                 self._owned = FolderLock(self.folder)
 
     def start(self, tags: Sequence[str] | None = None) -> bool:
-        """Start recording these tags, or all. Return False when a recording is already running."""
+        """Start recording these tags; without any, all. Return False when a recording is already running."""
         if self._running is not None:
             return False
         if not self.writer.is_alive:  # most of many sites never record
@@ -137,7 +137,7 @@ class Recorder:
         self._decimation = Decimation(self._pose_period_ns)
         since_ns = self._now_ns()
         self._session = str(since_ns)
-        self._running = RunningRecording(since_ns, None if tags is None else tuple(tags))
+        self._running = RunningRecording(since_ns, tuple(tags) if tags else None)
         self._tell()
         return True
 

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,6 +22,17 @@ def bench(tmp_path: Path) -> ApiBench:
     answers.tags.register("a")
     bench.recorder = Recorder(tmp_path, LIMITS, 1, answers.tags, answers.site, answers.now_ns, {})
     return bench
+
+
+@pytest.mark.parametrize("wanted", [{}, {"tags": None}, {"tags": []}])
+def test_a_recording_of_no_named_tags_is_one_of_all_tags(wanted: dict[str, Any], bench: ApiBench) -> None:
+    app, recorder = bench.app(), bench.recorder
+    assert recorder is not None
+    started = ask(app, "POST", "/api/v1/recordings", json=wanted)
+    assert (started.status_code, started.json()["tags"]) == (201, None)
+    recorder.record_messages([(0, b"payload", ENCODING_PACKED, T_NS)])
+    recorder.writer.flush()
+    assert recorder.written == 1
 
 
 def test_a_recording_is_started_stopped_listed_and_downloaded(bench: ApiBench) -> None:
