@@ -139,4 +139,4 @@ dist: $(STAMP)
 
 # Installs the wheels into an empty environment, compiles the estimator and looks at the page: minutes, and the network.
 test-dist: dist
-	@$(BIN)/python -m pytest tests/deploy/test_installation.py -s -m installation $(PYTEST)
+	@$(BIN)/python -m pytest tests/deploy -s -m installation $(PYTEST)

@@ -10,6 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from dropanchor_service.runtime.shipped_kernels import PACKAGE as KERNELS
 from release.hatch import hatch
 from release.kernels import build_kernels
 from release.licences import NAME as LICENCES
@@ -41,9 +42,16 @@ def build(into: Path) -> None:
     wheels = {package_of(folder).replace("_", "-"): _build_distribution(folder, into, time_s) for folder in FOLDERS}
     bill = bill_of_materials(wheels, needed, version(), time_s)
     (into / f"dropanchor-{version()}.cdx.json").write_text(bill, encoding="utf-8")
-    for name in ("LICENSE", "constraints.txt"):
-        shutil.copyfile(ROOT / name, into / name)
+    shutil.copyfile(ROOT / "LICENSE", into / "LICENSE")
+    (into / "constraints.txt").write_text(_constraints(), encoding="utf-8")
     _write_checksums(into)
+
+
+def _constraints() -> str:
+    """Return the versions of all packages, ours first: pip then installs this release over a later or an older one."""
+    ours = [f"{name}=={version()}" for name in (*(package_of(folder) for folder in FOLDERS), KERNELS)]
+    lines = "\n".join(ours).replace("_", "-")
+    return f"{lines}\n{(ROOT / 'constraints.txt').read_text(encoding='utf-8')}"
 
 
 def _write_checksums(into: Path) -> None:

@@ -48,8 +48,8 @@ def follow(blocks: list[Block], folder: Path, url: str) -> str:
     return "".join(said)
 
 
-def run(script: str, folder: Path) -> str:
-    """Run a script of the shell in a folder, and return what it prints. Fails when it does.
+def run(script: str, folder: Path, **variables: str) -> str:
+    """Run a script of the shell in a folder, with these variables, and return what it prints. Fails when it does.
 
     What mypy knows of installed packages is kept: to check them takes longer than the rest of its guide.
     """
@@ -57,7 +57,7 @@ def run(script: str, folder: Path) -> str:
     done = subprocess.run(
         ["bash", "-euc", script],
         cwd=folder,
-        env=environment(PATH=programs, MYPY_CACHE_DIR=str(ROOT / ".mypy_cache" / "guides")),
+        env=environment(PATH=programs, MYPY_CACHE_DIR=str(ROOT / ".mypy_cache" / "guides"), **variables),
         capture_output=True,
         text=True,
         timeout=TIMEOUT_S,
