@@ -3,13 +3,17 @@
 import json
 import os
 import shutil
+import socket
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
+import httpx
 import pytest
 
-from support.service import ROOT
+from support.patience import PATIENCE_S
+from support.service import ROOT, command, environment, running_service
+from support.zenoh_router import free_port
 
 DOCKERFILE = ROOT / "deploy" / "Dockerfile"
 PLACES = ("/src", "/opt/dropanchor", "/var/cache", "/var/lib/dropanchor")
@@ -37,12 +41,42 @@ def test_the_build_steps_give_a_program_that_runs(tmp_path: Path) -> None:
     shutil.rmtree(tmp_path / "opt")  # 700 MB
 
 
-def test_the_image_does_not_run_as_root_and_starts_the_service_by_default() -> None:
+def test_the_image_does_not_run_as_root_and_starts_the_service_by_default(tmp_path: Path) -> None:
     _, final = stages()
     instruction = dict(final)
     assert instruction["USER"] == "dropanchor"
-    assert [json.loads(instruction["ENTRYPOINT"]), json.loads(instruction["CMD"])] == [["dropanchor"], ["serve"]]
+    assert [json.loads(instruction["ENTRYPOINT"]), default_command(tmp_path)[0]] == [["dropanchor"], "serve"]
     assert instruction["STOPSIGNAL"] == "SIGTERM"
+
+
+def test_the_image_alone_refuses_to_be_open_to_the_network_and_says_what_to_do(tmp_path: Path) -> None:
+    words = command(*default_command(tmp_path))
+    done = subprocess.run(words, env=environment(), capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    assert done.returncode == 2
+    assert "would be open to the network without credentials" in done.stderr
+    assert "DROPANCHOR_INSECURE=true" in done.stderr
+
+
+def test_the_image_listens_on_all_addresses_and_keeps_data_in_its_volume(tmp_path: Path) -> None:
+    _, *options = default_command(tmp_path)
+    for is_new in (True, False):
+        with running_service(*options, "--insecure") as service:
+            elsewhere = service.url.replace("0.0.0.0", "127.0.0.2")
+            if is_new:
+                httpx.put(f"{elsewhere}/api/v1/anchors/7", json={"id": "7"}, trust_env=False).raise_for_status()
+            site = httpx.get(f"{elsewhere}/api/v1/site", trust_env=False).json()
+            assert [anchor["id"] for anchor in site["anchors"]] == ["7"]
+            port = service.get("/api/v1/connect")["endpoints"][0].rpartition(":")[2]
+            socket.create_connection(("127.0.0.2", int(port))).close()
+
+
+def default_command(folder: Path) -> list[str]:
+    """Return what the image runs unless told otherwise, on a free port of Zenoh, with its volume in a folder."""
+    instruction = dict(stages()[1])
+    volume = instruction["VOLUME"]
+    words = json.loads(instruction["CMD"])
+    assert volume in words
+    return [inside(word, folder).replace(":7447", f":{free_port()}") for word in words]
 
 
 def stages() -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:

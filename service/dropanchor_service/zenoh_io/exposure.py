@@ -61,8 +61,10 @@ def is_loopback(host: str) -> bool:
 def _exposed_zenoh(settings: ZenohSettings, credentials: SecurityFolder | None) -> Iterator[str]:
     if settings.config_file is not None:
         yield from _exposed_by_file(settings)
-    elif credentials is None and not settings.connect:
-        yield from (f"Zenoh at {endpoint}" for endpoint in settings.listen if _is_reachable(endpoint))
+    elif not settings.connect and (credentials is None or "listen" in settings.model_fields_set):
+        safe = () if credentials is None else _ENCRYPTED_LINKS  # without TLS nobody shows a certificate
+        exposed = (endpoint for endpoint in settings.listen if not endpoint.startswith(safe))
+        yield from (f"Zenoh at {endpoint}" for endpoint in exposed if _is_reachable(endpoint))
 
 
 def _exposed_by_file(settings: ZenohSettings) -> Iterator[str]:

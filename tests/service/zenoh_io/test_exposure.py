@@ -49,9 +49,11 @@ def test_a_service_that_only_connects_needs_no_credentials() -> None:
     check(zenoh={"connect": "tcp/192.0.2.1:7447", "listen": "tcp/0.0.0.0:7447"})
 
 
-def test_with_credentials_zenoh_may_listen_anywhere(tmp_path: Path) -> None:
+def test_with_credentials_zenoh_may_listen_anywhere_with_tls(tmp_path: Path) -> None:
     folder = secured_site(tmp_path / "security").folder.path
     check(zenoh={"listen": "tls/0.0.0.0:7447"}, security={"folder": folder})
+    with pytest.raises(SettingsError, match=r"Zenoh at tcp/0\.0\.0\.0:7447 would be open"):
+        check(zenoh={"listen": "tcp/0.0.0.0:7447"}, security={"folder": folder})
 
 
 def test_missing_credentials_are_named(tmp_path: Path) -> None:
