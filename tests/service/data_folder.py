@@ -18,6 +18,7 @@ from dropanchor_schemas.zones import BatteryLowRule
 from dropanchor_service.api.routes.plan_examples import PLAN
 from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.format import Snapshot, UnreadableLayoutError, decoded
+from dropanchor_service.checkpoints.layouts import why_unreadable
 from dropanchor_service.delivery.receiver_networks import AllowedNetwork
 from dropanchor_service.estimation.columns import POSE
 from dropanchor_service.events.drafts import destination_test
@@ -50,7 +51,7 @@ WITH_COPY = [
 BEGIN_EMPTY = ["history.sqlite", "events.sqlite", "share_links.json", "share_key"]
 OTHERS = [CHECKPOINT, "plans/image"]
 FILES = [*WITH_COPY, *BEGIN_EMPTY, *OTHERS]
-NOT_READ = {"owner.lock", ".lock", "site", "checkpoints/checkpoint-000000000001"}
+NOT_READ = {"owner.lock", ".lock", "site", "written_by", "checkpoints/checkpoint-000000000001"}
 
 DATABASES = ["history.sqlite", "events.sqlite"]  # SQLite needs to write beside them
 IN_SECURITY = ["issued.json", "api_keys.json", "ca.key"]
@@ -145,8 +146,8 @@ class Parts:
 
 def decode(whole: bytes) -> Snapshot:
     layout, found = decoded(whole)
-    if layout != "layout":
-        raise UnreadableLayoutError(f"its layout is {layout}")
+    if (why := why_unreadable(layout, "layout")) is not None:
+        raise UnreadableLayoutError(f"its layout is {why}")
     return found
 
 

@@ -3,32 +3,36 @@
 Each file that a service writes gets each fault. `test_this_page_knows_every_file` finds those that are missing here.
 """
 
+import re
 import shutil
 import sqlite3
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import orjson
 import pytest
 
-from dropanchor_service.checkpoints.files import CheckpointFolder
-from dropanchor_service.checkpoints.format import Snapshot
+from dropanchor_service.checkpoints import layouts
+from dropanchor_service.checkpoints.format import Snapshot, encoded
 from dropanchor_service.runtime.recovery import COPY, MARK, copy_of
+from dropanchor_service.runtime.written_by import FILE as WRITTEN_BY
 from dropanchor_service.security.api_keys import ApiKeys
 from dropanchor_service.security.folder import SecurityError, SecurityFolder
 from dropanchor_service.security.identity import Scope
 from dropanchor_service.security.issued import Table
 from dropanchor_service.settings.sources import SettingsError
+from dropanchor_tag_client.host import VERSION
 from service.data_folder import (
+    CHECKPOINT,
     DATABASES,
     FILES,
     IN_SECURITY,
     NOT_READ,
     WITH_COPY,
     Parts,
-    decode,
     file_in,
     full_disk,
     is_let_in,
@@ -165,42 +169,69 @@ def test_damage_on_a_full_disk_is_named_and_the_rest_is_served(
     assert aside.read_bytes() == whole
 
 
-@pytest.mark.parametrize("name", [*WITH_COPY[:5], "events.sqlite"])  # the others may have unknown fields
-def test_a_file_of_a_later_version_is_refused_in_words_and_stays(folder: Path, name: str) -> None:
+@pytest.mark.parametrize("name", [*WITH_COPY, *DATABASES, "share_links.json", CHECKPOINT, *IN_SECURITY[:2]])
+def test_a_file_of_a_later_version_stays_and_that_version_is_asked_for(folder: Path, name: str) -> None:
     path = file_in(folder, name)
-    for one in (path, copy_of(path)):
-        if one.exists():
-            make_it_newer(one)
+    make_it_newer(path)
+    for written in (folder / "data", folder / "security"):
+        (written / WRITTEN_BY).write_text("99.0.0\n")
     whole = path.read_bytes()
-    with pytest.raises(SettingsError, match=f"(?s){name}.*(install the version that wrote it|move the file away)"):
-        Parts(folder)
-    assert path.read_bytes() == whole
+    asked = {CHECKPOINT: "which a later version wrote: install that"}.get(name, "this is .*: install version 99.0.0")
+    assert re.search(f"{Path(name).name}.*{asked}", said_at_a_start(folder))
+    unread = path.with_name(f"unread-{path.name}")
+    assert (unread if name == CHECKPOINT else path).read_bytes() == whole
     assert not list(path.parent.glob(f"*{MARK}*"))
+    assert (folder / "data" / WRITTEN_BY).read_text() == "99.0.0\n"
 
 
-def test_a_history_or_a_checkpoint_of_a_later_version_stays(folder: Path) -> None:
-    make_it_newer(file_in(folder, "history.sqlite"))
-    newer = CheckpointFolder(folder / "data" / "checkpoints", "later", decode)
-    newer.write(Snapshot({}, {"value": 3}))
-    with opened(folder) as parts:
-        assert not parts.tracks.writer.flush()
-        assert "schema version 99" in str(parts.persistence.problems())
-        found, complaints = parts.checkpoints.newest()
-        assert found is not None
-        assert found.document["value"] == 2
-        assert "kept as unread-checkpoint" in str(complaints)
-        assert parts.recovery.problems() == []
+@pytest.mark.parametrize("name", [*WITH_COPY[:5], *IN_SECURITY[:2]])  # the others may have unknown fields
+def test_what_this_version_does_not_know_is_of_a_later_one_even_if_nothing_names_that(folder: Path, name: str) -> None:
+    path = file_in(folder, name)
+    copy_of(path).unlink(missing_ok=True)
+    document = orjson.loads(path.read_bytes())
+    first_of(document)["of_later"] = True
+    path.write_bytes(orjson.dumps(document))
+    assert re.search(f"a later version wrote .*{name} .*of_later.*: install that version", said_at_a_start(folder))
+    assert orjson.loads(path.read_bytes()) == document
+
+
+def test_a_folder_names_the_latest_version_that_wrote_there_and_damage_is_mended_all_the_same(folder: Path) -> None:
+    mark, zones = folder / "data" / WRITTEN_BY, folder / "data" / "zones.json"
+    for written, left in (("0.0.9", VERSION), ("99.0.0", "99.0.0")):
+        mark.write_text(written)
+        truncate(zones)
+        assert "zones.json is damaged; its last good copy is used" in said_at_a_start(folder)
+        assert mark.read_text().strip() == left
+
+
+def said_at_a_start(folder: Path) -> str:
+    try:
+        with opened(folder) as parts:
+            parts.tracks.writer.flush()
+            _, complaints = parts.checkpoints.newest()
+            return "; ".join([*parts.recovery.problems(), *parts.persistence.problems(), *complaints])
+    except SettingsError as error:
+        return str(error)
 
 
 def make_it_newer(path: Path) -> None:
     if path.suffix == ".sqlite":
         with closing(sqlite3.connect(path)) as connection:
             connection.execute("PRAGMA user_version = 99")
-        return
-    document = orjson.loads(path.read_bytes())
-    item = document if path.name.startswith("site.json") else next(iter(document.values()))
-    item["of_later"] = True
-    path.write_bytes(orjson.dumps(document))
+    elif path.suffix == ".json":
+        document = orjson.loads(path.read_bytes())
+        item = first_of(document)
+        item[next(iter(item))] = {"now": "an object"}
+        path.write_bytes(orjson.dumps(document))
+    else:
+        later = f"{layouts.VERSION + 1}-{'0' * 16}"
+        path.write_bytes(b"".join(encoded(Snapshot({}, {"value": 2}), later)))
+
+
+def first_of(document: dict[str, Any]) -> dict[str, Any]:
+    """Return the first item of a file, or what the file is about."""
+    found: dict[str, Any] = next((item for item in document.values() if isinstance(item, dict)), document)
+    return document if "hosts" in document else found
 
 
 @pytest.mark.parametrize("change", CHANGES)

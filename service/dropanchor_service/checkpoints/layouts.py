@@ -47,7 +47,12 @@ def why_unreadable(layout: str, own: str) -> str | None:
     if version is not None and oldest <= version < VERSION:
         return None
     if version is not None and version > VERSION:
-        return say("layout_later", "{theirs}, but this version uses {ours}, which is older", theirs=layout, ours=own)
+        return say(
+            "layout_later",
+            "{theirs}, which a later version wrote: install that version. This one uses {ours}",
+            theirs=layout,
+            ours=own,
+        )
     if version is not None and version < oldest:
         return say(
             "layout_too_early",

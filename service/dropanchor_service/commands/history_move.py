@@ -21,6 +21,7 @@ from dropanchor_service.history.postgresql.writer import DatabaseWriter
 from dropanchor_service.history.records import SLOT_NS, stored_poses
 from dropanchor_service.history.sqlite.track_file import VERSION
 from dropanchor_service.history.storage import Retention
+from dropanchor_service.runtime.written_by import later_schema
 
 POSES = 50_000  # about so many at once
 MOST_SLOTS = 8640  # a day
@@ -67,8 +68,10 @@ class HistoryFile:
                 version = connection.execute("PRAGMA user_version").fetchone()[0]
             except sqlite3.Error as error:
                 raise HistoryError(f"{path} is no history: {error}") from error
-            if not 1 <= version <= VERSION:
-                raise HistoryError(f"{path} has schema version {version}, but this version reads 1 to {VERSION}")
+            if version > VERSION:
+                raise HistoryError(later_schema(path, version, VERSION, path))
+            if version < 1:
+                raise HistoryError(f"{path} is another kind of database")
 
     def count_slots(self) -> int:
         """Return how many slots have poses."""

@@ -15,6 +15,7 @@ from typing import Any
 from dropanchor_schemas.sentences import said_by, say
 from dropanchor_service.history.sqlite.damaged_file import damage_in, is_damage
 from dropanchor_service.runtime.recovery import Recovery, damaged
+from dropanchor_service.runtime.written_by import later_schema
 
 FILE_NAME = "events.sqlite"
 VERSION = 5
@@ -67,7 +68,7 @@ PRAGMA user_version = {VERSION};
 
 
 class EventFileError(sqlite3.Error):
-    """The file has another schema version or is another kind of database."""
+    """The file is of a later version, or another kind of database."""
 
 
 class Database:
@@ -189,10 +190,10 @@ class Database:
         if version == 4:
             connection.executescript(f"BEGIN; {_STARTS} PRAGMA user_version = 5; COMMIT;")
             version = VERSION
-        if version not in (0, VERSION) or (version == 0 and tables):
-            raise EventFileError(
-                f"{self._path} has schema version {version}, but this service needs {VERSION}: move the file away"
-            )
+        if self._path is not None and version > VERSION:
+            raise EventFileError(later_schema(self._path, version, VERSION, self._path))
+        if version == 0 and tables:
+            raise EventFileError(f"{self._path} is another kind of database: move the file away")
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")  # an event that was answered with survives a power failure
         connection.execute("PRAGMA journal_size_limit = 67108864")

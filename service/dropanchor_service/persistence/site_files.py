@@ -9,6 +9,7 @@ from dropanchor_schemas.file_names import file_name_of
 from dropanchor_service.runtime.atomic_file import sync_folder, write_atomically
 from dropanchor_service.runtime.data_files import OF_SITE
 from dropanchor_service.runtime.recovery import copy_of
+from dropanchor_service.runtime.written_by import mark
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_tag_client.folder_lock import FolderInUseError, FolderLock
@@ -28,7 +29,9 @@ def own_data_folder(settings: Settings, shared: bool) -> AbstractContextManager[
         return nullcontext()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        return FolderLock(folder, shared=shared)
+        lock = FolderLock(folder, shared=shared)
+        mark(folder)
+        return lock
     except FolderInUseError as error:
         raise SettingsError(f"data_dir: {error}: stop it, or give this process a folder of its own") from error
     except (FileExistsError, NotADirectoryError) as error:

@@ -7,6 +7,7 @@ OF_SITE = (
 """Patterns of what belongs to one site, and moves with it."""
 OF_SERVICE = (
     *OF_SITE,
-    *("owner.lock", ".lock", "site", "sites", "checkpoints", "share_key*", "share_links.json*", "kernels-*", "cluster"),
+    *("owner.lock", ".lock", "written_by", "site", "sites", "checkpoints", "share_key*", "share_links.json*"),
+    *("kernels-*", "cluster"),
 )
 """Patterns of all that a service writes there; the rest is somebody else's."""

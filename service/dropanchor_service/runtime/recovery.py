@@ -13,10 +13,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
-from pydantic import ValidationError
-
 from dropanchor_schemas.sentences import say
 from dropanchor_service.runtime.atomic_file import UP_TO_UMASK, sync_folder, write_atomically
+from dropanchor_service.runtime.written_by import later_in, later_version
 
 COPY = ".last-good"
 MARK = ".damaged-"
@@ -25,7 +24,6 @@ BEGINS_EMPTY = say("begins_empty", "there was no good copy, so it begins empty")
 DAMAGED = say("is_damaged", "is damaged")
 MAX_ASIDE = 3  # of a file: a disk that keeps damaging files must not fill up with them
 _WHERE = ("*", "checkpoints/*", "plans/*", "sites/*/*", "sites/*/plans/*")  # what one service may have set aside
-_UNKNOWN = ("extra_forbidden", "union_tag_invalid", "literal_error", "enum")  # what a later version may have written
 _COMPANIONS = ("-wal", "-shm")  # of a database
 
 Content = TypeVar("Content")
@@ -86,7 +84,7 @@ class Recovery:
         except FileNotFoundError:
             return None
         except (OSError, ValueError) as error:
-            _refuse_newer(path, error)
+            _refuse_later(path, error)
             self.set_aside(path, _why(error), instead)
             return None
 
@@ -130,13 +128,15 @@ class Recovery:
 
     def _recovered(self, path: Path, parse: Parse[Content], mode: int, error: Exception) -> Content | None:
         """Return what is in the copy of a file, and put it in its place."""
+        if later_version(path) is not None:  # the copy may be of this one
+            _refuse_later(path, error)
         whole = _content(copy_of(path))
         good: Content | None = None
         if whole is not None:
             with suppress(ValueError):
                 good = parse(whole)
         if whole is None or good is None:
-            _refuse_newer(path, error)
+            _refuse_later(path, error)
             self.set_aside(path, _why(error), BEGINS_EMPTY)
             return None
         self._replace(path, whole, mode, _why(error))
@@ -231,12 +231,7 @@ def _why(error: Exception) -> str:
     return DAMAGED
 
 
-def _refuse_newer(path: Path, error: Exception) -> None:
-    """Raise NewerFileError if nothing is wrong but what only a later version can have written."""
-    found = error.errors(include_url=False, include_input=False) if isinstance(error, ValidationError) else []
-    if found and all(each["type"] in _UNKNOWN for each in found):
-        unknown = ".".join(str(part) for part in found[0]["loc"])
-        raise NewerFileError(
-            f"{path} holds {unknown}, which this version does not know: install the version that wrote it, or move the "
-            "file away"
-        ) from error
+def _refuse_later(path: Path, error: Exception) -> None:
+    """Raise NewerFileError if only a later version can have written what this error comes from."""
+    if (why := later_in(path, error)) is not None:
+        raise NewerFileError(why) from error

@@ -19,6 +19,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id, refuse_pattern
 from dropanchor_schemas.sentences import say
 from dropanchor_service.runtime.atomic_file import write_atomically
+from dropanchor_service.runtime.written_by import later_in, mark
 from dropanchor_service.security.files import PRIVATE, exclusive_lock
 from dropanchor_service.security.identity import Authenticator, Identity, Scope, UnauthenticatedError
 
@@ -189,7 +190,7 @@ class ApiKeys:
         except OSError as error:
             raise ApiKeyError(f"{self._file} cannot be read: {error.strerror}") from error
         except ValidationError as error:
-            raise ApiKeyError(f"{self._file} is damaged") from error
+            raise ApiKeyError(later_in(self._file, error) or f"{self._file} is damaged") from error
 
     def _write(self, keys: Mapping[str, ApiKey]) -> None:
         document = _KEYS.dump_python(dict(keys), mode="json")
@@ -197,6 +198,7 @@ class ApiKeys:
             if key["site"] is None:
                 del key["site"]
         content = json.dumps(document, indent=2, ensure_ascii=False)
+        mark(self._file.parent)
         write_atomically(self._file, [content.encode(), b"\n"], PRIVATE)
         self._keys, self._version = dict(keys), self._file_version()
 

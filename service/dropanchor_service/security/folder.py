@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from dropanchor_schemas.file_names import file_name_of
 from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.runtime.atomic_file import write_atomically
+from dropanchor_service.runtime.written_by import later_in, mark
 from dropanchor_service.security.access_control import READER, ROLES, ROUTER, SERVICE, reader_of
 from dropanchor_service.security.authority import Authority, Issued, expiry
 from dropanchor_service.security.files import LOCK, PRIVATE, PUBLIC, exclusive_lock
@@ -47,7 +48,8 @@ class SecurityFolder:
         except OSError as error:
             raise SecurityError(f"the credentials in {path} cannot be read: {error.strerror}") from error
         except ValidationError as error:
-            raise SecurityError(f"{path / TABLE} is damaged: {error.errors()[0]['msg']}") from error
+            damaged = f"{path / TABLE} is damaged: {error.errors()[0]['msg']}"
+            raise SecurityError(later_in(path / TABLE, error) or damaged) from error
 
     @classmethod
     def make(cls, path: Path, table: Table, days: int) -> Self:
@@ -263,6 +265,7 @@ class SecurityFolder:
 
     def _save(self, table: Table) -> None:
         self.table = table
+        mark(self.path)
         configuration = _json(self.router_configuration())
         write_atomically(self.path / TABLE, [_json(table.document())], PUBLIC)
         write_atomically(self.router_file, [configuration], PUBLIC)

@@ -56,5 +56,7 @@ def test_a_standby_reads_the_layouts_before_its_own_but_no_later_one(monkeypatch
     assert obstacles[3] is obstacles[4] is None
     assert obstacles[2] == f"the checkpoint has the layout {of(2)}, but this version uses {own} and reads none before 3"
     assert obstacles[5] == f"the checkpoint has the layout {of(5)}, but this version uses {own}"
-    assert obstacles[6] == f"the checkpoint has the layout {of(6)}, but this version uses {own}, which is older"
+    assert obstacles[6] == (
+        f"the checkpoint has the layout {of(6)}, which a later version wrote: install that version. This one uses {own}"
+    )
     assert obstacle(replace(HELD, layout=""), "s", own) is None

@@ -111,7 +111,7 @@ def test_a_damaged_file_is_moved_aside_and_another_version_is_refused(tmp_path: 
     with sqlite3.connect(tmp_path / FILE_NAME) as connection:
         connection.execute("PRAGMA user_version = 99")
     connection.close()
-    with pytest.raises(EventFileError, match="move the file away"):
+    with pytest.raises(EventFileError, match="schema 99, and this version knows 5"):
         Database(tmp_path)
 
 

@@ -162,5 +162,5 @@ def test_another_kind_of_file_is_refused(tmp_path: Path) -> None:
     with sqlite3.connect(other) as connection:
         connection.execute("PRAGMA user_version = 9")
     connection.close()
-    with pytest.raises(HistoryError, match="has schema version 9, but this version reads 1 to 4"):
+    with pytest.raises(HistoryError, match="it has schema 9, and this version knows 4"):
         HistoryFile(other)

@@ -295,10 +295,10 @@ def test_a_history_of_a_later_version_is_refused_and_not_changed(
     assert write(tracks, NOW_NS)
     database.close()
     postgresql.run(url, "UPDATE dropanchor_history.schema_version SET version = 99")
-    refusal = "has schema version 99, but this service needs 2: update the service, or name another database"
+    refusal = "it has schema 99, and this version knows 2): install that version, or name another database"
     assert not write(tracks, NOW_NS + SECOND)
     assert tracks.problems[0].endswith(refusal)
-    with pytest.raises(HistoryError, match="schema version 99"):
+    with pytest.raises(HistoryError, match="schema 99"):
         tracks.span()
     assert count_rows(postgresql, url, "poses") == 1
 

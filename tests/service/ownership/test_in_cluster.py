@@ -164,7 +164,7 @@ def test_a_standby_takes_over_from_the_version_before_it_with_all_tracks(tmp_pat
         former = Standby(reach, "yard", Claimant("old", "", "sites", 0.5), state.layout)
         with pytest.raises(KeyboardInterrupt):
             former.wait(looks(8))
-        assert f"the checkpoint has the layout {later}, but this version uses {state.layout}, which is older" in (
+        assert f"the checkpoint has the layout {later}, which a later version wrote: install that version" in (
             former.sentence
         )
 

@@ -5,6 +5,7 @@ from psycopg import Connection
 from dropanchor_service.estimation.columns import State
 from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.postgresql.pose_columns import COLUMNS
+from dropanchor_service.runtime.written_by import later_schema
 
 SCHEMA = "dropanchor_history"
 VERSION = 2  # 1: without heights
@@ -105,6 +106,9 @@ def _version(connection: Connection) -> int:
 
 
 def _refusal(version: int) -> HistoryError:
+    if version > VERSION:
+        why = later_schema("the history in the database", version, VERSION)
+        return HistoryError(f"{why}, or name another database")
     return HistoryError(
         f"the history in the database has schema version {version}, but this service needs {VERSION}: "
         "update the service, or name another database"

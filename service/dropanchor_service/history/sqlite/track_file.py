@@ -18,6 +18,7 @@ from dropanchor_service.history.records import SLOT_NS, records_of
 from dropanchor_service.history.sqlite.damaged_file import is_damage
 from dropanchor_service.history.sqlite.rows import SqliteRows
 from dropanchor_service.history.summary_table import SLOTS, SummaryTable
+from dropanchor_service.runtime.written_by import later_schema
 
 VERSION = 4  # 1: without summaries, 2: without heat, 3: without heights
 MAX_ROWS = 512  # per statement: sqlite3 releases the interpreter's lock in each one and must win it back
@@ -58,7 +59,7 @@ SELECT (page_count - freelist_count) * page_size FROM pragma_page_count, pragma_
 
 
 class TrackFileError(sqlite3.Error):
-    """The file has another schema version or is another kind of database."""
+    """The file is of a later version, or another kind of database."""
 
 
 class TrackWriter:
@@ -66,6 +67,7 @@ class TrackWriter:
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
+        self._path = path
         self._connection = sqlite3.connect(path, BUSY_S, isolation_level=None, check_same_thread=False)
         try:
             self._prepare()
@@ -146,10 +148,10 @@ class TrackWriter:
     def _prepare(self) -> None:
         version = self._connection.execute("PRAGMA user_version").fetchone()[0]
         tables = self._connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
-        if version not in (0, *_UPGRADES, VERSION) or (version == 0 and tables):
-            raise TrackFileError(
-                f"the file has schema version {version}, but this service needs {VERSION}: move the file away"
-            )
+        if version > VERSION:
+            raise TrackFileError(later_schema(self._path.name, version, VERSION, self._path))
+        if version == 0 and tables:
+            raise TrackFileError(f"{self._path.name} is another kind of database: move the file away")
         self._connection.execute("PRAGMA journal_mode = WAL")
         self._connection.execute("PRAGMA synchronous = NORMAL")
         self._connection.execute("PRAGMA journal_size_limit = 67108864")

@@ -230,7 +230,7 @@ export default {
   "say.compiled_once": "Das geschieht einmal nach einer Aktualisierung",
   "say.compiled_always": "Das geschieht bei jedem Start; das Protokoll sagt, warum",
   "say.layout_differs": "{theirs}, diese Version aber {ours}",
-  "say.layout_later": "{theirs}, diese Version aber {ours}, der älter ist",
+  "say.layout_later": "{theirs}, den eine spätere Version geschrieben hat: diese Version installieren. Die jetzige nutzt {ours}",
   "say.layout_too_early": "{theirs}, diese Version aber {ours}, und sie liest keinen vor {oldest}",
   "say.handed_over": "es wurde vor {seconds} s übergeben",
   "say.gave_up": "dieser Prozess lief eine Weile nicht, und die Datenbank hat seit {seconds} s nicht geantwortet",
@@ -242,5 +242,8 @@ export default {
   "say.is_damaged_so": "ist beschädigt ({why})",
   "say.is_empty": "ist leer",
   "say.is_unreadable": "kann nicht gelesen werden ({why})",
+  "say.of_later": "eine spätere Version hat {what} geschrieben ({how}): diese Version installieren",
+  "say.of_later_version": "Version {version} hat {what} geschrieben ({how}), und dies ist {own}: Version {version} installieren",
+  "say.schema_later": "das Schema ist {found}, und diese Version kennt {known}",
   "say.no_such_host": "Der Dienst hat diesen Namen nicht: http.allowed_hosts in den Einstellungen kann ihn hinzufügen.",
 };

@@ -230,7 +230,7 @@ export default {
   "say.compiled_once": "This happens once after an update",
   "say.compiled_always": "This happens at every start; the log says why",
   "say.layout_differs": "{theirs}, but this version uses {ours}",
-  "say.layout_later": "{theirs}, but this version uses {ours}, which is older",
+  "say.layout_later": "{theirs}, which a later version wrote: install that version. This one uses {ours}",
   "say.layout_too_early": "{theirs}, but this version uses {ours} and reads none before {oldest}",
   "say.handed_over": "it was handed over {seconds} s ago",
   "say.gave_up": "this process did not run for a while, and the database has not answered for {seconds} s",
@@ -242,5 +242,8 @@ export default {
   "say.is_damaged_so": "is damaged ({why})",
   "say.is_empty": "is empty",
   "say.is_unreadable": "cannot be read ({why})",
+  "say.of_later": "a later version wrote {what} ({how}): install that version",
+  "say.of_later_version": "version {version} wrote {what} ({how}), and this is {own}: install version {version}",
+  "say.schema_later": "it has schema {found}, and this version knows {known}",
   "say.no_such_host": "The service does not have this name: http.allowed_hosts in the settings can add it.",
 };
