@@ -5,9 +5,13 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
+TOOLS := $(VENV)/tools
 COMPILED := $(VENV)/compiled
 KERNELS := $(shell find service/dropanchor_service/estimation service/dropanchor_service/zones service/dropanchor_service/*/kernels -name '*.py')
-DISTRIBUTIONS := -e schemas -e tag_client -e service/evaluation -e 'service[cluster,evaluation,foxglove,maps,mqtt,parquet,postgresql,ros2,s3]'
+INSTALL := install --quiet --constraint constraints.txt
+DISTRIBUTIONS := -e schemas -e 'tag_client[calibrate,mqtt,serial]' -e service/evaluation -e 'service[cluster,evaluation,foxglove,maps,mqtt,parquet,postgresql,ros2,s3]'
+TOOLS_TOO := --group dev -e 'tag_client[imu]' -e 'service[recordings]'
+FAILED := echo 'The installation failed; the lines above say why. Mend that, then run the same make command again.' >&2; exit 1
 PACKAGES := schemas/dropanchor_schemas tag_client/dropanchor_tag_client service/dropanchor_service service/evaluation/dropanchor_evaluation
 PARALLEL := -n 6 --dist loadfile --no-loadscope-reorder
 PYPROJECTS := pyproject.toml constraints.txt schemas/pyproject.toml tag_client/pyproject.toml service/pyproject.toml service/evaluation/pyproject.toml
@@ -16,7 +20,7 @@ FAST_TESTS := -n 3 --dist worksteal -m 'not benchmark and not cluster and not in
 
 RESULTS := service/docs/results
 
-.PHONY: help demo docs test test-cluster check bench results pictures install kernels chromium mosquitto proxies postgresql clean
+.PHONY: help demo docs pythons would-install test test-cluster check bench results pictures install kernels chromium mosquitto proxies postgresql clean
 .DEFAULT_GOAL := help
 
 # The same as in tests/conftest.py, from the first import on.
@@ -43,8 +47,13 @@ $(STAMP): $(PYPROJECTS)
 	@$(PYTHON) -m venv $(VENV) || { echo 'python -m venv failed. On Debian or Ubuntu: apt-get install python3-venv' >&2; exit 1; }
 	@echo '== installing Dropanchor and what it needs (once; afterwards no network is needed)'
 	@$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
-	@$(BIN)/python -m pip install --quiet --constraint constraints.txt $(DISTRIBUTIONS) --group dev || \
-		{ echo 'The installation failed: is the network up? Then run the same make command again.' >&2; exit 1; }
+	@$(BIN)/python -m pip $(INSTALL) $(DISTRIBUTIONS) || { $(FAILED); }
+	@touch $@
+
+# Only checks, tests and documents need these.
+$(TOOLS): $(STAMP)
+	@echo '== installing the tools for checks, tests and documents (once)'
+	@$(BIN)/python -m pip $(INSTALL) $(TOOLS_TOO) || { $(FAILED); }
 	@touch $@
 
 # Here and not at the first start, which then takes seconds. Tests have a cache of their own.
@@ -56,11 +65,18 @@ $(COMPILED): $(STAMP) $(KERNELS)
 demo: install
 	@exec $(BIN)/dropanchor demo $(DEMO)
 
-docs: $(STAMP)
+# That the pins hold for the Pythons that are promised: .ci/pythons.
+would-install: $(STAMP)
+	@$(BIN)/python -m pip --python $(PYTHON) $(INSTALL) --dry-run $(DISTRIBUTIONS) $(TOOLS_TOO)
+
+pythons: $(STAMP)
+	@.ci/pythons
+
+docs: $(TOOLS)
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --config-file service/mkdocs.yml
 	@echo 'The pages are in build/docs: $(BIN)/python -m http.server --bind 127.0.0.1 --directory build/docs'
 
-kernels: $(STAMP)
+kernels: $(TOOLS)
 	@PYTHONPATH=tests $(BIN)/python -m support.kernel_cache
 
 chromium:
@@ -95,11 +111,11 @@ postgresql:
 		apt-get update -qq && apt-get install -y -qq postgresql >/dev/null; } || \
 		echo 'The tests with a database need the package postgresql: without it they are skipped.' >&2
 
-test: $(STAMP) $(if $(FAST),,chromium mosquitto proxies postgresql kernels)
+test: $(TOOLS) $(if $(FAST),,chromium mosquitto proxies postgresql kernels)
 	@echo '== running $(if $(FAST),the fast,all) tests'
 	@$(BIN)/python -m pytest $(if $(FAST),$(FAST_TESTS),$(PARALLEL)) $(PYTEST)
 
-check: $(STAMP)
+check: $(TOOLS)
 	@$(BIN)/ruff format --check .
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy $(PACKAGES) tests
@@ -112,10 +128,10 @@ check: $(STAMP)
 	@$(BIN)/python -m dropanchor_evaluation.results --check
 	@PYTHONPATH=tests $(BIN)/python -m pictures --check
 
-bench: $(STAMP) chromium postgresql
+bench: $(TOOLS) chromium postgresql
 	@$(BIN)/python -m pytest tests/benchmarks -s -m '' $(PYTEST)
 
-test-cluster: $(STAMP) postgresql
+test-cluster: $(TOOLS) postgresql
 	@$(BIN)/python -m pytest tests/e2e/test_upgrade_on_ray.py tests/benchmarks/test_cluster_failures.py tests/benchmarks/test_cluster_of_hosts.py -s -m '' $(PYTEST)
 
 results: bench
@@ -125,7 +141,7 @@ results: bench
 	@$(BIN)/dropanchor evaluate ablate --into $(RESULTS)/ablation.md
 	@$(BIN)/dropanchor evaluate bounds --into $(RESULTS)/scenarios.md $(EVALUATE)
 
-pictures: $(STAMP) chromium
+pictures: $(TOOLS) chromium
 	@PYTHONPATH=tests $(BIN)/python -m pictures
 
 clean:
@@ -134,7 +150,7 @@ clean:
 .PHONY: dist test-dist
 
 # A release in dist/, built twice to see that it comes out the same: deploy/release/README.md.
-dist: $(STAMP)
+dist: $(TOOLS)
 	@PYTHONPATH=deploy $(BIN)/python -m release.build dist
 
 # Installs the wheels into an empty environment, compiles the estimator and looks at the page: minutes, and the network.

@@ -12,7 +12,6 @@ Dropanchor is under the Apache License 2.0 (`LICENSE`). Its distributions hold n
 browser, too, is all its own. An installation fetches the packages below, each with its own licence in its own
 distribution. The licences are those that the packages declare; where one has several parts, its distribution says
 which licence each part has. *Always* are the packages of every service; the others come with the extra that is named.
-Extras that are not in the list have no tested versions.
 
 | package | tested version | licence | comes with |
 |---|---|---|---|

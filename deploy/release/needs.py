@@ -37,12 +37,9 @@ class Package:
 
 
 def packages() -> list[Package]:
-    """Return what the service needs, and its and the tag client's extras. Raises OtherVersionError.
-
-    Extras whose packages have no tested version are left out.
-    """
+    """Return what the service needs, and its and the tag client's extras. Raises OtherVersionError."""
     always = _closure([("dropanchor-service", "")])
-    of_extras = {f"{name}[{extra}]": _closure([(name, extra)]) for name, extra in _tested_extras()}
+    of_extras = {f"{name}[{extra}]": _closure([(name, extra)]) for name, extra in _extras()}
     needs: dict[str, set[str]] = {}
     for found in (always, *of_extras.values()):
         for name, needed in found.items():
@@ -69,11 +66,8 @@ def pins() -> dict[str, str]:
     return {canonicalize_name(name): version for name, _, version in (line.partition("==") for line in lines)}
 
 
-def _tested_extras() -> Iterator[tuple[str, str]]:
-    for name, project in own().items():
-        for extra, lines in project.get("optional-dependencies", {}).items():
-            if all(canonicalize_name(Requirement(line).name) in pins().keys() | own().keys() for line in lines):
-                yield name, extra
+def _extras() -> Iterator[tuple[str, str]]:
+    return ((name, extra) for name, project in own().items() for extra in project.get("optional-dependencies", {}))
 
 
 def _closure(roots: Iterable[tuple[str, str]]) -> dict[str, set[str]]:

@@ -159,6 +159,8 @@ def test_the_packages_that_the_service_needs_are_listed_with_their_licences(dist
     assert found["numba"].extras == ()
     assert found["ray"].extras == ("dropanchor-service[cluster]",)
     assert found["sympy"].extras == ("dropanchor-service[evaluation]",)
+    assert found["gtsam"].extras == ("dropanchor-service[recordings]",)
+    assert found["adafruit-extended-bus"].extras == ("dropanchor-tag-client[imu]",)
     assert "llvmlite" in found["numba"].needs
     page = wheel(dist, "service").read(f"dropanchor_service-{version()}.dist-info/licenses/{LICENCES}").decode()
     for name, one in found.items():
