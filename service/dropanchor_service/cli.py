@@ -21,6 +21,7 @@ _COMMANDS = {
     "router": "run a separate Zenoh router",
     "api": "run an API node of a cluster: the page and REST of all its sites",
     "cluster": "run sites on several machines: start, show, move, drain",
+    "settings": "show every setting in force, where it comes from and what it hides",
     "security": "create the credentials of a site",
     "tag": "issue and revoke the certificates of tags",
     "compile": "compile the estimator ahead of the first start",

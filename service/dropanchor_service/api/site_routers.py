@@ -23,6 +23,7 @@ from dropanchor_service.api.routes.poses import poses_router
 from dropanchor_service.api.routes.receiver_networks import receiver_networks_router
 from dropanchor_service.api.routes.recordings import recordings_router
 from dropanchor_service.api.routes.remote_settings import remote_settings_router
+from dropanchor_service.api.routes.settings import settings_router
 from dropanchor_service.api.routes.shares import shares_router
 from dropanchor_service.api.routes.site import site_router
 from dropanchor_service.api.routes.stream import stream_router
@@ -51,6 +52,7 @@ def site_routers() -> tuple[APIRouter, ...]:
         tags_router(),
         tag_router(),
         site_router(),
+        settings_router(),
         north_router(),
         remote_settings_router(),
         track_router(),

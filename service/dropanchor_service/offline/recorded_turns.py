@@ -20,7 +20,7 @@ from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.quota import Quota
 from dropanchor_service.store import LatestPoses, Sites, SiteStore
-from dropanchor_service.store.site import SiteDocument
+from dropanchor_service.store.site_values import SiteDocument
 
 SETTLE_NS = 1_000_000_000  # after this time no message is still waiting in a reorder buffer
 _BUFFER_BYTES = 2**30

@@ -18,12 +18,14 @@ from dropanchor_service.plans.floors import follow_floors
 from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
-from dropanchor_service.runtime.recovery import NewerFileError, Recovery
+from dropanchor_service.runtime.recovery import NewerFileError, Recovery, copy_of
 from dropanchor_service.settings.history import HistorySettings, RecordingSettings
+from dropanchor_service.settings.layers import Layer
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import Sites, SiteStore, TagTable
 from dropanchor_service.store.omlox_items import OmloxItems
+from dropanchor_service.store.site import FILE_NAME
 
 if TYPE_CHECKING:
     from dropanchor_service.basemap.basemap import ServedBasemap
@@ -175,21 +177,58 @@ def open_site(settings: Settings, recovery: Recovery | None = None) -> SiteStore
     recovery: reports a file that is damaged.
     """
     try:
-        return SiteStore(settings.site, settings.listed_tags, settings.data_dir, settings.tag_defaults, recovery)
+        store = SiteStore(settings.site, settings.listed_tags, settings.data_dir, settings.tag_defaults, recovery)
     except NewerFileError as error:
         raise SettingsError(f"data_dir: {error}") from error
+    store.layers = settings.layers
+    return store
+
+
+def saved_site(settings: Settings, name: str) -> SiteStore:
+    """Return a site as a service with these settings would have it, and change nothing. Raises SettingsError."""
+    own = settings_of(settings, name)
+    store = open_site(own.model_copy(update={"data_dir": None}))
+    folder = settings.data_dir
+    if folder is None or own.data_dir is None:
+        return store
+    before_it_moves = folder if settings.sites else folder_of_site(folder, name)
+    for path in (own.data_dir / FILE_NAME, copy_of(own.data_dir / FILE_NAME), before_it_moves / FILE_NAME):
+        try:
+            store.share(path.read_bytes(), lambda _: None)
+            break
+        except FileNotFoundError:
+            continue
+        except (OSError, ValueError) as error:
+            _log.warning("%s cannot be read: %s", path, error)
+    return store
 
 
 def open_sites(settings: Settings, recovery: Recovery | None = None) -> Sites:
     """Return the sites, as the settings and the data folder have them; see `open_site`. Raises SettingsError."""
     if not settings.sites:
-        return Sites([(open_site(settings, recovery), settings.quota)])
+        return Sites([(_open_only_site(settings, recovery), settings.quota)])
     stores = [open_site(settings_of(settings, name), recovery) for name in settings.sites]
     for name, store in zip(settings.sites, stores, strict=True):
-        if store.site.id != name:
-            raise SettingsError(f"data_dir: the folder of the site {name!r} holds the files of {store.site.id!r}")
+        if (owner := store.values.site.id) != name:
+            raise SettingsError(f"data_dir: the folder of the site {name!r} holds the files of {owner!r}")
     quotas = [site.quota(settings.quota) for site in settings.sites.values()]
     return Sites(list(zip(stores, quotas, strict=True)))
+
+
+def _open_only_site(settings: Settings, recovery: Recovery | None) -> SiteStore:
+    """Return the only site. What another one has left in the data folder is its own from now on."""
+    store = open_site(settings, recovery)
+    if (former := store.values.site.id) != settings.site.id:
+        _log.warning(
+            "the site %r is %r now, as the settings say: tags must use this id in their keys, or set site.id",
+            former,
+            settings.site.id,
+        )
+        try:
+            store.take_over()
+        except OSError as error:
+            _log.error("the new id of the site cannot be saved: %s", error)
+    return store
 
 
 def settings_of(settings: Settings, name: str) -> Settings:
@@ -203,7 +242,13 @@ def settings_of(settings: Settings, name: str) -> Settings:
         "tag_defaults": site.tag_defaults.over(settings.tag_defaults),
         "data_dir": None if folder is None else folder_of_site(folder, name),
     }
-    return settings.model_copy(update=own)
+    return settings.model_copy(update=own).loaded_from(_layers_of(settings, name))
+
+
+def _layers_of(settings: Settings, name: str) -> list[Layer]:
+    """Return the layers of one of several sites: what its table does not hold is as at the top level."""
+    shared = [layer._replace(values={"tag_defaults": layer.values.get("tag_defaults")}) for layer in settings.layers]
+    return [*shared, *(layer.below("sites", name) for layer in settings.layers)]
 
 
 def _open_omlox(settings: Settings, recovery: Recovery) -> OmloxItems:

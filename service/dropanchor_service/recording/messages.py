@@ -15,7 +15,7 @@ from dropanchor_service.estimation.columns import Array, Frame
 from dropanchor_service.history.records import ESTIMATED
 from dropanchor_service.recording import schemas
 from dropanchor_service.store.floors import is_height_known
-from dropanchor_service.store.site import SiteDocument
+from dropanchor_service.store.site_values import SiteDocument
 
 FRAME = "site"
 SITE_TOPIC = "/site"

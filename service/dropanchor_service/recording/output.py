@@ -13,7 +13,8 @@ from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.mcap_file import McapFile, TooManyChannelsError
 from dropanchor_service.recording.messages import pose_messages, site_messages, topic_of
 from dropanchor_service.recording.schemas import PACKED_SAMPLES, SAMPLES
-from dropanchor_service.store.site import SiteDocument, SiteStore
+from dropanchor_service.store.site import SiteStore
+from dropanchor_service.store.site_values import SiteDocument
 from dropanchor_service.store.tags import TagTable
 
 _log = logging.getLogger(__name__)

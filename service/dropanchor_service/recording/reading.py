@@ -18,7 +18,7 @@ from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
 from dropanchor_service.recording.mcap_file import METADATA, PROFILE
 from dropanchor_service.recording.messages import ESTIMATE, SITE_TOPIC
 from dropanchor_service.recording.output import JSON, PACKED
-from dropanchor_service.store.site import SiteDocument
+from dropanchor_service.store.site_values import SiteDocument
 from dropanchor_tag_client.recording import RecordingError
 
 _READ_ERRORS = (McapError, struct.error, zstandard.ZstdError, RuntimeError, ValueError, EOFError)

@@ -1,12 +1,12 @@
 """The settings of the service. `sources` reads them; they are built once and passed down."""
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
 
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.estimation.paper.attitude import AttitudeParameters
@@ -18,6 +18,7 @@ from dropanchor_service.settings.events import DeliverySettings, EmailSettings, 
 from dropanchor_service.settings.history import HistorySettings, RecordingSettings
 from dropanchor_service.settings.http import HttpSettings
 from dropanchor_service.settings.ids import SettingsId, SiteId
+from dropanchor_service.settings.layers import Layer
 from dropanchor_service.settings.lists import as_list
 from dropanchor_service.settings.quota import Quota, UnknownTags
 from dropanchor_service.settings.sites import ScopeName, SiteSettings
@@ -201,6 +202,16 @@ class Settings(_Section):
         default={}, description="A site of several in one process, in place of `[site]` and `[tags]`."
     )
     paper: PaperSettings = PaperSettings()
+    _layers: Sequence[Layer] = PrivateAttr(default=())
+
+    def loaded_from(self, layers: Sequence[Layer]) -> Self:
+        """Note where the settings come from, in ascending priority."""
+        self._layers = layers
+        return self
+
+    @property
+    def layers(self) -> Sequence[Layer]:
+        return self._layers
 
     @property
     def quota(self) -> Quota:

@@ -4,7 +4,7 @@ import difflib
 import json
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from dropanchor_schemas.site import Typed
 from dropanchor_service.settings.former_names import FORMER, with_present_names
+from dropanchor_service.settings.layers import Layer
 from dropanchor_service.settings.model import Settings
 
 ENVIRONMENT_PREFIX = "DROPANCHOR_"
@@ -31,17 +32,17 @@ def load_settings(
 
     Raises SettingsError.
     """
-    given = {
-        str(file): _from_file(file),
-        "the environment": _from_environment(environment),
-        "the command line": dict(options or {}),
-    }
-    layers = [(source, with_present_names(source, settings)) for source, settings in given.items()]
+    given = [
+        Layer("file", _from_file(file), None if file is None else str(file)),
+        Layer("environment", _from_environment(environment)),
+        Layer("command_line", dict(options or {})),
+    ]
+    layers = [layer._replace(values=with_present_names(layer.name, layer.values)) for layer in given]
     merged: dict[str, Any] = {}
-    for _, layer in layers:
-        merged = _merged(merged, layer)
+    for layer in layers:
+        merged = _merged(merged, layer.values)
     try:
-        return Settings.model_validate(merged)
+        return Settings.model_validate(merged).loaded_from(layers)
     except ValidationError as error:
         raise SettingsError("\n".join(_message(entry, layers) for entry in error.errors())) from error
 
@@ -95,10 +96,11 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any
     return merged
 
 
-def _message(error: Any, layers: list[tuple[str, dict[str, Any]]]) -> str:
+def _message(error: Any, layers: Sequence[Layer]) -> str:
     """Return one line with the source, the key and what is expected, without the value, which may be a secret."""
     path = [str(part) for part in error["loc"] if part != "[key]"]  # pydantic adds this when the key itself is wrong
-    source, _ = max(reversed([entry for entry in layers if entry[1]]), key=lambda entry: _depth(entry[1], path))
+    given = [layer for layer in reversed(layers) if layer.values]
+    source = max(given, key=lambda layer: _depth(layer.values, path)).name
     key = ".".join(path) or "the settings together"
     if error["type"] == "extra_forbidden":
         return f"{source}: {key} is not a setting{_suggestion(path)}"

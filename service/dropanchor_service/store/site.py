@@ -1,35 +1,26 @@
-"""The site, its anchors and its tag settings: configured, changed over REST, saved in a file."""
+"""The site, its anchors and its tag settings: configured, changed over REST, and what was changed saved in a file."""
 
 import logging
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from threading import Lock
 
-from pydantic import BaseModel, ConfigDict
-
 from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Anchor, RemoteSettings, Site, TagSettings
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_service.runtime.recovery import Recovery, write_with_copy
+from dropanchor_service.settings.layers import Layer
+from dropanchor_service.store.anchor_indices import AnchorIndices
 from dropanchor_service.store.floors import NO_FLOORS
 from dropanchor_service.store.groups import Groups, groups_of
 from dropanchor_service.store.preconditions import Precondition, always, require
 from dropanchor_service.store.shared import Save
+from dropanchor_service.store.site_values import Configured, SetValues, SiteDocument, nothing_set, values_in, without
+from dropanchor_service.store.trail import NO_TRAIL, Change, Trail
 
 FILE_NAME = "site.json"
 
 _log = logging.getLogger(__name__)
-
-
-class SiteDocument(BaseModel):
-    """The content of the file."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    site: Site
-    tags: dict[str, TagSettings] = {}
-    remote: dict[str, RemoteSettings] = {}
-    deleted_ns: dict[str, int] = {}  # tags that were deleted, and when, UTC
 
 
 class SiteStore:
@@ -37,11 +28,12 @@ class SiteStore:
 
     The ingest thread writes when it places the first anchor that a tag ranges to. `version` grows with every change,
     so that one comparison detects a change. floors: those of the plans. epoch: grows when another process of a cluster
-    takes the site over; 0 without a cluster.
+    takes the site over; 0 without a cluster. layers: where the configured values are from.
     """
 
     epoch = 0
     floors = NO_FLOORS
+    layers: Sequence[Layer] = ()
 
     def __init__(
         self,
@@ -51,7 +43,7 @@ class SiteStore:
         tag_defaults: TagSettings | None = None,
         recovery: Recovery | None = None,
     ) -> None:
-        """Load the file in `folder` if there is one, else use `site` and `tags`.
+        """Load what was set over REST from the file in `folder`, if there is one. The rest is as in `site` and `tags`.
 
         folder: where changes are saved; with None they are lost at a restart. tag_defaults: what a tag gets where its
         own settings say nothing. recovery: reports a file that is damaged.
@@ -59,32 +51,58 @@ class SiteStore:
         """
         self._lock = Lock()
         self.default_settings = tag_defaults or TagSettings()
-        self._document = SiteDocument(site=site, tags=tags)
+        self.configured = Configured(site, tags, self.default_settings)
+        self.trail: Trail = NO_TRAIL
+        self._values = nothing_set(site.id)
         self._save_bytes: Save | None = None
         self._has_file = False
         if folder is not None:
             self._open_file(folder / FILE_NAME, recovery or Recovery())
-        self._anchors: dict[int, tuple[int, Anchor]] = {}  # number → (index for the engine, anchor)
-        self._index_anchors()
+        self._document = self._values.in_force(self.configured)
+        self._indices = AnchorIndices(self.site.anchors)
         self._groups = groups_of(self._document.tags, self.default_settings)
         self._told: list[Callable[[], None]] = []
         self.version = 1
 
     def _open_file(self, path: Path, recovery: Recovery) -> None:
         self._save_bytes = lambda content: write_with_copy(path, content)
-        found = recovery.read(path, SiteDocument.model_validate_json)
-        if found is not None:
-            self._document = found
-            self._has_file = True
+        found = recovery.read(path, self._parsed)
+        if found is None:
+            return
+        self._values, is_older = found
+        self._has_file = True
+        if is_older:
+            self._migrate()
+
+    def _parsed(self, content: bytes) -> tuple[SetValues, bool]:
+        return values_in(content, self.configured)
+
+    def _migrate(self) -> None:
+        """Save what an older file has as set, before somebody changes the settings and more of it seems to be."""
+        named = [*self._values.anchors, *(tag for tag, own in self._values.tags.items() if own.model_fields_set)]
+        _log.info("%s was of an older form: of its anchors and tags, %s count as set over REST", FILE_NAME, named[:20])
+        try:
+            self._save(self._values)
+        except OSError as error:
+            _log.error("%s cannot be saved (%s): the next start tries again", FILE_NAME, error)
+
+    def take_over(self) -> None:
+        """Make the file this site's, although it names another one. Raises OSError."""
+        site = self._values.site.model_copy(update={"id": self.site.id})
+        self._values = self._values.model_copy(update={"site": site})
+        self._save(self._values)
 
     def share(self, saved: bytes | None, save: Save) -> None:
         """Go on from what another process has saved of this site; see `Shared`. Call this before the first message."""
         self._save_bytes = save
         if saved is not None:
-            self._anchors = {}
-            self._apply(SiteDocument.model_validate_json(saved))
+            self._indices = AnchorIndices()
+            values, is_older = self._parsed(saved)
+            self._apply(values, values.in_force(self.configured))
+            if is_older:
+                self._migrate()
         elif self._has_file:
-            self._save(self._document)
+            self._save(self._values)
 
     def on_change(self, told: Callable[[], None]) -> None:
         """Call this after every change, on the thread that makes it."""
@@ -97,6 +115,11 @@ class SiteStore:
     @property
     def site(self) -> Site:
         return self._document.site
+
+    @property
+    def values(self) -> SetValues:
+        """What was set over REST. The value never changes."""
+        return self._values
 
     @property
     def document(self) -> SiteDocument:
@@ -113,8 +136,8 @@ class SiteStore:
 
     def anchor_index(self, number: int) -> int | None:
         """Return the engine's index of the anchor with this number, or None when the site does not have it."""
-        entry = self._anchors.get(number)
-        return None if entry is None or entry[1] not in self.site.anchors else entry[0]
+        anchor = self._indices.anchor(number)
+        return None if anchor is None or anchor not in self.site.anchors else self._indices.index(number)
 
     def lacks(self, number: int) -> bool:
         """Return whether the site has no anchor with this number."""
@@ -122,12 +145,12 @@ class SiteStore:
 
     def anchors_by_index(self) -> list[Anchor]:
         """Return every anchor that the site has or had. An index keeps its meaning for the life of the store."""
-        return [anchor for _, anchor in sorted(self._anchors.values(), key=lambda entry: entry[0])]
+        return self._indices.all()
 
     def restore_indices(self, anchors: Sequence[Anchor]) -> None:
         """Give these anchors of an earlier store, in order of their index, the same index here. Call this first."""
-        self._anchors = {anchor.number: (index, anchor) for index, anchor in enumerate(anchors)}
-        self._index_anchors()
+        self._indices = AnchorIndices(anchors)
+        self._indices.add(self.site.anchors)
         self.version += 1
         self._tell()
 
@@ -136,9 +159,12 @@ class SiteStore:
         with self._lock:
             if self.site.anchors:
                 return False
-            document = self._document.model_copy(update={"site": _with_anchor(self.site, Anchor(id=anchor))})
+            first = Anchor(id=anchor)
+            site = self._document.site_with(first)
+            values = self._values.with_first(first, site, self.configured)
+            document = self._document.model_copy(update={"site": site})
             try:
-                self._save(document)
+                self._replace(values, document, Change("anchor", anchor, None, first))
             except OSError as error:  # the tags cannot wait for a disk, and nobody relies on the file yet
                 _log.error(
                     "anchor %s is the origin, but only until a restart: the site cannot be saved (%s). Make room or "
@@ -146,7 +172,7 @@ class SiteStore:
                     anchor,
                     error,
                 )
-            self._apply(document)
+                self._apply(values, document)
             return True
 
     def set_site(self, site: Site, allows: Precondition = always) -> None:
@@ -164,7 +190,7 @@ class SiteStore:
                         site=repr(self.site.id),
                     )
                 )
-            self._replace(self._document.model_copy(update={"site": site}))
+            self._replace_site(site, Change("site", site.id, self.site, site))
 
     def anchor(self, anchor: str) -> Anchor | None:
         """Return the anchor with this id, or None."""
@@ -176,8 +202,9 @@ class SiteStore:
         Raises OSError, and ChangedMeanwhileError when `allows` refuses.
         """
         with self._lock:
-            require(allows, self.anchor(anchor.id))
-            self._replace(self._document.model_copy(update={"site": _with_anchor(self.site, anchor)}))
+            before = self.anchor(anchor.id)
+            require(allows, before)
+            self._replace_site(self._document.site_with(anchor), Change("anchor", anchor.id, before, anchor))
 
     def remove_anchor(self, anchor: str, allows: Precondition = always) -> None:
         """Remove the anchor with this id and save the site.
@@ -190,8 +217,7 @@ class SiteStore:
                 raise KeyError(anchor)
             require(allows, known)
             left = [other for other in self.site.anchors if other != known]
-            site = self.site.model_copy(update={"anchors": left})
-            self._replace(self._document.model_copy(update={"site": site}))
+            self._replace_site(self.site.model_copy(update={"anchors": left}), Change("anchor", known.id, known, None))
 
     def set_tag(self, tag: str, settings: TagSettings, allows: Precondition = always) -> None:
         """Replace the settings of the tag and save them. What is not given becomes the default.
@@ -201,8 +227,10 @@ class SiteStore:
         with self._lock:
             require(allows, self.tag_settings(tag))
             complete = settings.over(self.default_settings)
-            update = {"tags": self.tags | {tag: complete}, "deleted_ns": self._deleted_without(tag)}
-            self._replace(self._document.model_copy(update=update))
+            values = self._values.with_tag(tag, complete, self.configured)
+            update = {"tags": self.tags | {tag: complete}, "deleted_ns": values.deleted_ns}
+            change = Change("tag", tag, self.tags.get(tag), complete)
+            self._replace(values, self._document.model_copy(update=update), change)
 
     def remove_tag(self, tag: str, now_ns: int, allows: Precondition = always) -> None:
         """Remove everything that is set for the tag, note when it was deleted, and save that.
@@ -211,18 +239,18 @@ class SiteStore:
         """
         with self._lock:
             require(allows, self.tag_settings(tag))
-            tags, remote = dict(self.tags), dict(self._document.remote)
-            tags.pop(tag, None)
-            remote.pop(tag, None)
-            update = {"tags": tags, "remote": remote, "deleted_ns": self._document.deleted_ns | {tag: now_ns}}
-            self._replace(self._document.model_copy(update=update))
+            update = {
+                "tags": without(tag, self._values.tags),
+                "remote": without(tag, self._values.remote),
+                "deleted_ns": self._values.deleted_ns | {tag: now_ns},
+            }
+            document = self._document.model_copy(update=update | {"tags": without(tag, self.tags)})
+            change = Change("tag", tag, self.tags.get(tag), None)
+            self._replace(self._values.model_copy(update=update), document, change)
 
     def was_deleted_after(self, tag: str, heard_ns: int) -> bool:
         """Return whether the tag was deleted after it had last sent something."""
         return self._document.deleted_ns.get(tag, -1) >= heard_ns
-
-    def _deleted_without(self, tag: str) -> dict[str, int]:
-        return {name: t_ns for name, t_ns in self._document.deleted_ns.items() if name != tag}
 
     @property
     def groups(self) -> Groups:
@@ -241,31 +269,28 @@ class SiteStore:
         with self._lock:
             if expected is not None and expected != self.remote_settings(tag):
                 return False
-            self._replace(self._document.model_copy(update={"remote": self._document.remote | {tag: settings}}))
+            update = {"remote": self._document.remote | {tag: settings}}
+            change = Change("remote-settings", tag, self._document.remote.get(tag), settings)
+            self._replace(self._values.model_copy(update=update), self._document.model_copy(update=update), change)
             return True
 
-    def _replace(self, document: SiteDocument) -> None:
-        """Save first, then apply: a restart never loses an acknowledged change. Raises OSError."""
-        self._save(document)
-        self._apply(document)
+    def _replace_site(self, site: Site, change: Change) -> None:
+        document = self._document.model_copy(update={"site": site})
+        self._replace(self._values.with_site(site, self.configured), document, change)
 
-    def _save(self, document: SiteDocument) -> None:
+    def _replace(self, values: SetValues, document: SiteDocument, change: Change) -> None:
+        """Note and save first, then apply: a restart never loses an acknowledged change. Raises OSError."""
+        with self.trail.changing(change):
+            self._save(values)
+        self._apply(values, document)
+
+    def _save(self, values: SetValues) -> None:
         if self._save_bytes is not None:
-            self._save_bytes(document.model_dump_json(indent=2).encode())
+            self._save_bytes(values.to_bytes())
 
-    def _apply(self, document: SiteDocument) -> None:
-        self._document = document
+    def _apply(self, values: SetValues, document: SiteDocument) -> None:
+        self._values, self._document = values, document
         self._groups = groups_of(document.tags, self.default_settings)
-        self._index_anchors()
+        self._indices.add(self.site.anchors)
         self.version += 1
         self._tell()
-
-    def _index_anchors(self) -> None:
-        for anchor in self.site.anchors:
-            index = self._anchors.get(anchor.number, (len(self._anchors),))[0]
-            self._anchors[anchor.number] = (index, anchor)
-
-
-def _with_anchor(site: Site, anchor: Anchor) -> Site:
-    others = [other for other in site.anchors if other.number != anchor.number]
-    return Site.model_validate(site.model_dump() | {"anchors": [*others, anchor]})

@@ -17,9 +17,29 @@ HEADER = ("key", "type", "unit", "default", "meaning")
 _INTRODUCTION = """\
 # Settings
 
-`dropanchor serve --config site.toml` reads a TOML file. An environment variable overrides the file: `port` in
-`[http]` is `DROPANCHOR_HTTP__PORT`. An option of the command overrides both. A key that does not exist is an error that
-names the file, the key and the nearest one that does exist.
+`dropanchor serve --config site.toml` reads a TOML file. The environment variable of `port` in `[http]` is
+`DROPANCHOR_HTTP__PORT`. A key that does not exist is an error that names the file, the key and the nearest one that
+does exist.
+
+## Which value holds
+
+For each value, the first of these that has it:
+
+1. what was set over REST or on the page: of the site (but not its `id`), of anchors, of tags
+2. the option of the command
+3. the environment variable
+4. the settings file: of a tag, `[tags.<id>]` before `[tag_defaults]`
+5. the default; for a site without anchors, the anchor of the first range
+
+This holds for each key of the site and of a tag, and for each anchor as a whole, so what nobody has set over REST
+follows the settings file at each start. `georeference` and `start` are one value each. An anchor or a tag that was
+deleted over REST stays deleted, also when the file has it. A value that is put over REST as it is configured is not
+kept as set: that gives it back. `site.json` in `data_dir` holds what was set, and nothing else.
+
+`dropanchor settings --show` prints every value in force, where it comes from, and what it hides; `--json` writes JSON.
+`GET /api/v1/settings` shows the same of a site.
+
+## Tags
 
 `[tags.<id>]` holds the settings of one tag, and `[tag_defaults]` those of all tags that do not say otherwise. Quote
 an id in TOML where it holds more than letters, digits, `_` and `-`.
