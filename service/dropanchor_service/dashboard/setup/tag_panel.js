@@ -3,7 +3,7 @@
 import { readMeasure, writeMeasure } from "../data/units.js";
 import { Saving } from "../data/saving.js";
 import { confirmed } from "./confirm.js";
-import { fillForm, numberOf, patchOf, typedIn } from "./tag_form.js";
+import { fillForm, noteSent, numberOf, patchOf, typedIn } from "./tag_form.js";
 import { t } from "../i18n/language.js";
 
 /** @typedef {import("../data/changes.js").Seen} Seen */
@@ -13,6 +13,10 @@ export class TagPanel {
   #tag = "";
   /** @type {Seen | null} */
   #seen = null;
+  /** The tag whose settings the form was filled with. */
+  #filled = "";
+  /** The latest request for the settings. */
+  #loading = Promise.resolve();
   #saving = new Saving();
 
   /** @param {HTMLElement} panel @param {HTMLDialogElement} dialog @param {import("../data/fleet.js").Fleet} fleet
@@ -42,7 +46,7 @@ export class TagPanel {
     this.startForm.addEventListener("reset", () => start.cancel());
     start.addEventListener("change", () => this.#showStart());
     changes.addEventListener("access", () => this.update());
-    changes.addEventListener("done", (event) => /** @type {CustomEvent} */ (event).detail === this.#path && this.#load(this.#seen !== null && this.#saving.now === null));
+    changes.addEventListener("done", (event) => /** @type {CustomEvent} */ (event).detail === this.#path && this.#load());
     choice.addEventListener("change", () => this.update());
     this.update();
   }
@@ -71,7 +75,12 @@ export class TagPanel {
   }
 
   /** Request the settings and show them, if the form is open. @param {boolean} [keep] what is typed and not saved */
-  async #load(keep = false) {
+  #load(keep = true) {
+    this.#loading = this.#read(keep);
+  }
+
+  /** @param {boolean} keep */
+  async #read(keep) {
     const tag = this.#tag;
     this.#seen = null;
     if (!tag || !this.box.open) return;
@@ -79,25 +88,31 @@ export class TagPanel {
       const seen = await this.changes.read(this.#path);
       if (tag !== this.#tag) return;
       this.#seen = seen;
-      const typeAgain = keep ? typedIn(this.form) : () => {};
+      const typeAgain = keep && tag === this.#filled ? typedIn(this.form) : () => {};
       fillForm(this.form, seen.value, new Set(this.fleet.groups.filter((group) => group !== "")));
       typeAgain();
+      this.#filled = tag;
     } catch {
       // A tag that was deleted has no settings. The table drops it with its next update.
     }
   }
 
-  /** @param {Event} event */
+  /** Save what is typed, once an earlier change is saved and shown. @param {Event} event */
   async #save(event) {
     event.preventDefault();
-    if (!this.#seen) return;
-    await this.#saving.until(this.#edit(t("setup.saved", { tag: this.#tag }), patchOf(this.form)));
+    const tag = this.#tag;
+    await this.#saving.now;
+    await this.#loading;
+    if (!this.#seen || tag !== this.#tag) return;
+    noteSent(this.form, true);
+    const isSaved = await this.#saving.until(this.#edit(t("setup.saved", { tag }), patchOf(this.form)));
+    if (!isSaved && tag === this.#tag) noteSent(this.form, false);
   }
 
   /** @param {string} what @param {object} patch @param {import("../data/changes.js").More} [more] */
   async #edit(what, patch, more) {
     const seen = this.#seen ?? (await this.changes.read(this.#path));
-    return this.changes.edit(what, this.#path, patch, seen, () => this.#load(), more);
+    return this.changes.edit(what, this.#path, patch, seen, () => this.#load(false), more);
   }
 
   #beginStart() {
