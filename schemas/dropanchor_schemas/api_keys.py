@@ -54,5 +54,8 @@ class AccessKeyList(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    available: bool = Field(description="Whether there is access control, without which nobody needs a key.")
+    available: bool = Field(
+        description="Whether keys can be created and revoked here. They need access control, without which nobody "
+        "needs one, and a folder `keys` of the credentials that the service may write."
+    )
     keys: list[AccessKey]

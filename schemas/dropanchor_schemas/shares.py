@@ -65,6 +65,7 @@ class ShareList(BaseModel):
     model_config = ConfigDict(frozen=True)
 
     available: bool = Field(
-        description="Whether links can be created. They need access control: without it everybody sees everything."
+        description="Whether links can be created and revoked. They need access control, without which everybody sees "
+        "everything, and a data folder that the service may write."
     )
     shares: list[Share]

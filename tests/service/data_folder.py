@@ -54,7 +54,7 @@ FILES = [*WITH_COPY, *BEGIN_EMPTY, *OTHERS]
 NOT_READ = {"owner.lock", ".lock", "site", "written_by", "checkpoints/checkpoint-000000000001"}
 
 DATABASES = ["history.sqlite", "events.sqlite"]  # SQLite needs to write beside them
-IN_SECURITY = ["issued.json", "api_keys.json", "ca.key"]
+IN_SECURITY = ["issued.json", "keys/api_keys.json", "ca.key"]
 
 
 class Parts:

@@ -173,7 +173,7 @@ def test_damage_on_a_full_disk_is_named_and_the_rest_is_served(
 def test_a_file_of_a_later_version_stays_and_that_version_is_asked_for(folder: Path, name: str) -> None:
     path = file_in(folder, name)
     make_it_newer(path)
-    for written in (folder / "data", folder / "security"):
+    for written in (folder / "data", folder / "security", folder / "security" / "keys"):
         (written / WRITTEN_BY).write_text("99.0.0\n")
     whole = path.read_bytes()
     asked = {CHECKPOINT: "which a later version wrote: install that"}.get(name, "this is .*: install version 99.0.0")

@@ -10,7 +10,8 @@ import json
 import logging
 import secrets
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -20,10 +21,12 @@ from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id, refuse_patte
 from dropanchor_schemas.sentences import say
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.runtime.written_by import later_in, mark
-from dropanchor_service.security.files import PRIVATE, exclusive_lock
+from dropanchor_service.security.files import PRIVATE, exclusive_lock, may_write
 from dropanchor_service.security.identity import Authenticator, Identity, Scope, UnauthenticatedError
 
-FILE = "api_keys.json"
+FOLDER = "keys"  # of its own, so that a service may write it and nothing else of the credentials
+FILE = f"{FOLDER}/api_keys.json"
+FORMER_FILE = "api_keys.json"
 SOURCE = say("source_key", "key")
 PREFIX = "dropanchor_"
 CHECK_S = 1.0  # how often to look for changes of the file
@@ -72,13 +75,22 @@ class ApiKeys:
 
     may_block = False
 
-    def __init__(self, folder: Path, clock: Callable[[], float] = time.monotonic) -> None:
-        """Read the keys in `folder`. Raises ApiKeyError when the file is damaged."""
-        self._file = folder / FILE
+    def __init__(self, folder: Path, clock: Callable[[], float] = time.monotonic, is_copied: bool = False) -> None:
+        """Read the keys in `folder`. Raises ApiKeyError when the file is damaged.
+
+        is_copied: whether other machines have the same keys, so that they are not changed in one place.
+        """
+        self._file, self._former = folder / FILE, folder / FORMER_FILE
+        self._is_copied = is_copied
         self._clock = clock
         self._checked_s = clock()
         self._version = self._file_version()
         self._keys = self._read()
+
+    @property
+    def can_change(self) -> bool:
+        """Whether keys can be made and revoked here."""
+        return not self._is_copied and may_write(self._file.parent)
 
     def all(self) -> Mapping[str, ApiKey]:
         """Return the keys by id."""
@@ -110,7 +122,7 @@ class ApiKeys:
         tag: str | None = None,
         site: str | None = None,
     ) -> str:
-        with exclusive_lock(self._file.parent):
+        with self._changing():
             keys = self._read()
             if any(key.name == name for key in keys.values()):
                 raise ApiKeyError(f"a key named {name!r} exists already; revoke it first, or choose another name")
@@ -125,7 +137,7 @@ class ApiKeys:
 
     def revoke(self, name: str) -> None:
         """Remove the key with this name. Raises ApiKeyError when there is none."""
-        with exclusive_lock(self._file.parent):
+        with self._changing():
             keys = self._read()
             remaining = {identifier: key for identifier, key in keys.items() if key.name != name}
             if len(remaining) == len(keys):
@@ -134,7 +146,7 @@ class ApiKeys:
 
     def revoke_id(self, identifier: str) -> bool:
         """Remove the key with this id. Return whether there was one. Raises ApiKeyError when the file is damaged."""
-        with exclusive_lock(self._file.parent):
+        with self._changing():
             keys = self._read()
             is_known = keys.pop(identifier, None) is not None
             if is_known:
@@ -175,22 +187,36 @@ class ApiKeys:
             _log.error("%s; the keys read before stay valid until the file is repaired", error)
         self._version = version  # last: if another thread wrote meanwhile, the next look reads its keys
 
+    @contextmanager
+    def _changing(self) -> Iterator[None]:
+        """Lock the file, so that no change of another process is lost. Raises FolderInUseError and OSError."""
+        self._file.parent.mkdir(mode=0o700, exist_ok=True)
+        with exclusive_lock(self._file.parent):
+            yield
+
+    @property
+    def _newest(self) -> Path:
+        """The file, or that of an earlier version as long as nothing has changed since."""
+        return self._file if self._file.exists() else self._former
+
     def _file_version(self) -> tuple[int, int] | None:
         try:
-            status = self._file.stat()
-        except FileNotFoundError:
+            status = self._newest.stat()
+        except OSError:
             return None
         return status.st_mtime_ns, status.st_ino
 
     def _read(self) -> dict[str, ApiKey]:
+        file = self._file
         try:
-            return _KEYS.validate_json(self._file.read_bytes())
+            file = self._newest
+            return _KEYS.validate_json(file.read_bytes())
         except FileNotFoundError:
             return {}
         except OSError as error:
-            raise ApiKeyError(f"{self._file} cannot be read: {error.strerror}") from error
+            raise ApiKeyError(f"{file} cannot be read: {error.strerror}") from error
         except ValidationError as error:
-            raise ApiKeyError(later_in(self._file, error) or f"{self._file} is damaged") from error
+            raise ApiKeyError(later_in(file, error) or f"{file} is damaged") from error
 
     def _write(self, keys: Mapping[str, ApiKey]) -> None:
         document = _KEYS.dump_python(dict(keys), mode="json")
@@ -200,6 +226,8 @@ class ApiKeys:
         content = json.dumps(document, indent=2, ensure_ascii=False)
         mark(self._file.parent)
         write_atomically(self._file, [content.encode(), b"\n"], PRIVATE)
+        with suppress(OSError):  # an earlier version must not accept what is revoked from now on
+            self._former.unlink()
         self._keys, self._version = dict(keys), self._file_version()
 
 

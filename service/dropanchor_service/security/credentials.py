@@ -103,7 +103,7 @@ def _providers_of(settings: Settings) -> dict[str, IdentityProvider]:
     security = settings.security
     try:
         if security.folder is not None:
-            providers[api_keys.SOURCE] = ApiKeys(security.folder)
+            providers[api_keys.SOURCE] = ApiKeys(security.folder, is_copied=settings.cluster.url is not None)
     except ApiKeyError as error:
         raise SettingsError(f"security.folder: {error}") from error
     if security.oidc is not None:

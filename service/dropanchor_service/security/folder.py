@@ -14,6 +14,7 @@ from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.runtime.written_by import later_in, mark
 from dropanchor_service.security.access_control import READER, ROLES, ROUTER, SERVICE, reader_of
+from dropanchor_service.security.api_keys import FOLDER as API_KEYS
 from dropanchor_service.security.authority import Authority, Issued, expiry
 from dropanchor_service.security.files import LOCK, PRIVATE, PUBLIC, exclusive_lock
 from dropanchor_service.security.issued import IssuedTag, Table
@@ -77,6 +78,7 @@ class SecurityFolder:
 
     def _fill(self, days: int) -> None:
         """Create everything. Raises OSError."""
+        (self.path / API_KEYS).mkdir(mode=0o700)  # for who mounts it, even before there is a key
         authority = Authority.make("Dropanchor site authority")
         self._write_pair("ca", authority.issued)
         self._issue_roles(authority, days)

@@ -14,7 +14,7 @@ from dropanchor_schemas.sentences import say
 from dropanchor_schemas.shares import Share, ShareRequest
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.runtime.recovery import Recovery
-from dropanchor_service.security.files import PRIVATE, exclusive_lock
+from dropanchor_service.security.files import PRIVATE, exclusive_lock, may_write
 from dropanchor_service.security.identity import Authenticator, Identity, Limit, Scope, UnauthenticatedError
 
 SOURCE = say("source_link", "share link")
@@ -63,6 +63,11 @@ class ShareLinks:
         self._key = self._key_in(folder / KEY_FILE)
         self._lock = Lock()
         self._links = self._read()
+
+    @property
+    def can_change(self) -> bool:
+        """Whether links can be created and revoked."""
+        return may_write(self._file.parent)
 
     def of_site(self, site: str) -> Sequence[Share]:
         """Return the links of a site, the first to expire first."""

@@ -33,10 +33,10 @@ def test_init_prints_the_next_steps_and_never_overwrites(tmp_path: Path, capsys:
     output = capsys.readouterr().out
     assert "dropanchor tag add NAME" in output
     assert "dropanchor router --security" in output
-    before = {file.name: file.read_bytes() for file in folder.iterdir()}
+    before = {file.name: file.read_bytes() for file in folder.rglob("*") if file.is_file()}
     assert main(init) == 2
     assert "never overwritten" in capsys.readouterr().err
-    assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
+    assert {file.name: file.read_bytes() for file in folder.rglob("*") if file.is_file()} == before
 
 
 @pytest.mark.parametrize(

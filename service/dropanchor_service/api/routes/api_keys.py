@@ -55,7 +55,7 @@ def _add_list_route(router: APIRouter) -> None:
         keys = _all_keys(request)
         found = sorted(_keys_of(request, keys).items(), key=lambda entry: entry[1].made)
         listed = [_shown(identifier, key).model_dump() for identifier, key in found]
-        return json_response({"available": keys is not None, "keys": listed})
+        return json_response({"available": keys is not None and keys.can_change, "keys": listed})
 
 
 def _add_create_route(router: APIRouter) -> None:
@@ -99,25 +99,36 @@ def _add_revoke_route(router: APIRouter) -> None:
         key: Annotated[str, Path(description="The id of the key.", examples=[_EXAMPLE["id"]])], request: Request
     ) -> None:
         keys = _all_keys(request)
-        is_listed = key in _keys_of(request, keys)
-        with _changing():
-            if keys is None or not is_listed or not keys.revoke_id(key):
-                raise ProblemError(
-                    Kind.UNKNOWN_KEY, say("no_such_key", "There is no such key. GET /api/v1/keys lists them.")
-                )
+        unknown = ProblemError(
+            Kind.UNKNOWN_KEY, say("no_such_key", "There is no such key. GET /api/v1/keys lists them.")
+        )
+        if keys is None or key not in _keys_of(request, keys):
+            raise unknown
+        with _changing(keys):
+            if not keys.revoke_id(key):
+                raise unknown
 
 
 def _made(keys: ApiKeys, body: KeyRequest, site: str) -> str:
     """Make a key and return its secret. Raises ProblemError."""
-    with _changing():
+    with _changing(keys):
         if body.tag is not None:
             return keys.add_for_tag(body.name, body.tag, body.days, site)
         return keys.add(body.name, Scope.named(body.scope or "read"), body.days, site)
 
 
 @contextmanager
-def _changing() -> Iterator[None]:
+def _changing(keys: ApiKeys) -> Iterator[None]:
     """Turn a change of the keys that cannot be made into a problem. Then nothing has changed."""
+    if not keys.can_change:
+        raise ProblemError(
+            Kind.NOT_SAVED,
+            say(
+                "key_by_command",
+                "This service may not change its keys. Make and revoke them with `dropanchor key`, where its "
+                "credentials were made.",
+            ),
+        )
     try:
         with saving():
             yield

@@ -51,7 +51,8 @@ def _add_list_route(router: APIRouter) -> None:
     async def list_shares(request: Request) -> Response:
         site, links = parts_of(request).id, _links_of(request)
         shares: Sequence[Share] = [] if links is None else links.of_site(site)
-        return json_response({"available": links is not None, "shares": [share.model_dump() for share in shares]})
+        available = links is not None and links.can_change
+        return json_response({"available": available, "shares": [share.model_dump() for share in shares]})
 
 
 def _add_create_route(router: APIRouter) -> None:

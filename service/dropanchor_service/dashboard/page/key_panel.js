@@ -30,8 +30,10 @@ export class KeyPanel {
 
   async #refresh() {
     const { available, keys } = await getJson(api("keys")).catch(() => ({ available: false, keys: [] }));
-    this.box.hidden = !available;
-    this.#part("list").replaceChildren(...keys.map((/** @type {Key} */ key) => this.#line(key)));
+    this.box.hidden = !available && keys.length === 0;
+    this.form.hidden = !available;
+    this.#part("by-command").hidden = available;
+    this.#part("list").replaceChildren(...keys.map((/** @type {Key} */ key) => this.#line(key, available)));
   }
 
   async #create() {
@@ -56,10 +58,12 @@ export class KeyPanel {
     this.#field("tag").disabled = !isTag;
   }
 
-  /** @param {Key} key */
-  #line({ id, name, scope, tag, expires_ns }) {
+  /** @param {Key} key @param {boolean} isRevocable */
+  #line({ id, name, scope, tag, expires_ns }, isRevocable) {
     const what = tag === null ? t(scope === "write" ? "access.word_write" : "access.word_read") : t("access.word_tag", { tag });
-    return revocableLine(lineOf(name, what, expires_ns), name, () => this.#attempt(async () => {
+    const text = lineOf(name, what, expires_ns);
+    if (!isRevocable) return Object.assign(document.createElement("li"), { textContent: text });
+    return revocableLine(text, name, () => this.#attempt(async () => {
       await send(api(`keys/${id}`), "DELETE", null);
       this.#part("created").hidden = true;
       await this.#refresh();

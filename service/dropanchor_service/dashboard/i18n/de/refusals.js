@@ -26,6 +26,7 @@ export default {
   "say.share_unknown": "Diesen Freigabelink gibt es nicht. GET /api/v1/shares listet sie auf.",
   "say.shares_full": "Es gibt schon {n} Freigabelinks: Widerrufen Sie einige.",
   "say.key_free": "Ohne Zugriffskontrolle braucht niemand einen Schlüssel.",
+  "say.key_by_command": "Dieser Dienst darf seine Schlüssel nicht ändern. Erstellen und widerrufen Sie sie mit `dropanchor key`, wo seine Zugangsdaten angelegt wurden.",
   "say.key_taken": "Es gibt schon einen Schlüssel namens {name}: Wählen Sie einen anderen Namen.",
   "say.no_such_key": "Diesen Schlüssel gibt es nicht. GET /api/v1/keys listet sie auf.",
   "say.key_use": "geben Sie einen Umfang oder ein Tag an",

@@ -26,6 +26,7 @@ export default {
   "say.share_unknown": "There is no such share link. GET /api/v1/shares lists them.",
   "say.shares_full": "There are {n} share links: revoke some.",
   "say.key_free": "Without access control nobody needs a key.",
+  "say.key_by_command": "This service may not change its keys. Make and revoke them with `dropanchor key`, where its credentials were made.",
   "say.key_taken": "There is a key named {name} already: choose another name.",
   "say.no_such_key": "There is no such key. GET /api/v1/keys lists them.",
   "say.key_use": "give a scope or a tag",
