@@ -14,6 +14,7 @@ from prometheus_client import CollectorRegistry, Metric, generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
 from dropanchor_service.metrics.cluster import ClusterGauges
+from dropanchor_service.metrics.node import LeaseGauges
 from support.service import ROOT, running_service
 
 DEPLOY = ROOT / "deploy"
@@ -44,6 +45,7 @@ def families(tmp_path_factory: pytest.TempPathFactory) -> list[Metric]:
         text = service.ask("GET", "/metrics").text
     of_cluster = CollectorRegistry()
     of_cluster.register(ClusterGauges("yard", lambda: (1, 0.0)))
+    of_cluster.register(LeaseGauges(lambda: ["yard"], list, lambda: 0.0))
     text += generate_latest(of_cluster).decode()
     return list(text_string_to_metric_families(text))
 

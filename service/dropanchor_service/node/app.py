@@ -2,15 +2,16 @@
 
 import re
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
+from typing import Any
 
 from fastapi import FastAPI
 from prometheus_client import CollectorRegistry
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
-from starlette.responses import RedirectResponse
+from starlette.responses import RedirectResponse, Response
 from starlette.routing import BaseRoute, Match, Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -23,11 +24,13 @@ from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.dashboard import page_mounts
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
+from dropanchor_service.api.routes.parameters import json_response
 from dropanchor_service.api.routes.plan_images import MAX_UPLOAD_BYTES
 from dropanchor_service.node.owners import Owners
 from dropanchor_service.security.identity import Authenticator
 
 REQUEST_ID = "x-request-id"
+TARGETS = "/metrics/targets"
 _ID = re.compile(r"[A-Za-z0-9._:-]{1,64}")
 
 Lifespan = Callable[[FastAPI], AbstractAsyncContextManager[None]]
@@ -60,22 +63,34 @@ def create_node_app(
     allow_origins(app, border.origins)
     add_error_handlers(app)
     page = page_mounts(dashboard)
-    metrics = Route("/metrics", _metrics_app(registry, authenticator, rate_limiter), methods=["GET"])
-    app.router.routes.extend([FrontPage(gateway, page[-1], owners), *page, metrics])
+    of_metrics = _metrics_app(registry, owners, authenticator, rate_limiter)
+    metrics = [Route(path, of_metrics, methods=["GET"]) for path in ("/metrics", TARGETS)]
+    app.router.routes.extend([FrontPage(gateway, page[-1], owners), *page, *metrics])
     app.include_router(health_router(ready, impaired), prefix=PREFIX)
     app.router.default = gateway
     return app
 
 
 def _metrics_app(
-    registry: CollectorRegistry, authenticator: Authenticator | None, rate_limiter: RateLimiter | None
+    registry: CollectorRegistry, owners: Owners, authenticator: Authenticator | None, rate_limiter: RateLimiter | None
 ) -> FastAPI:
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None)
     app.add_middleware(
         Access, authenticator=authenticator, rate_limiter=rate_limiter, members=lambda *_: [], only_site=None
     )
     app.include_router(metrics_router(registry))
+
+    @app.get(TARGETS)
+    async def get_targets() -> Response:
+        return json_response(targets_of(owners.addresses))
+
     return app
+
+
+def targets_of(addresses: Iterable[str]) -> list[dict[str, Any]]:
+    """Return where Prometheus finds the metrics of owners, as its HTTP service discovery expects it."""
+    divided = (address.partition("://") for address in sorted(addresses) if address)
+    return [{"targets": [host.rstrip("/")], "labels": {"__scheme__": scheme}} for scheme, _, host in divided]
 
 
 class FrontPage(Route):

@@ -63,6 +63,17 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
         yield Cluster(node, client, owners, secrets, received)
 
 
+def test_prometheus_finds_the_metrics_of_every_owner_through_a_node(cluster: Cluster) -> None:
+    targets = cluster.client.get("/metrics/targets")
+    assert targets.headers["content-type"] == "application/json"
+    found = [f"{one['labels']['__scheme__']}://{target}" for one in targets.json() for target in one["targets"]]
+    assert sorted(found) == sorted(owner.address for owner in cluster.owners)
+    for url in found:
+        assert httpx.get(f"{url}/metrics", headers=bearer(cluster.secrets["all"]), trust_env=False).status_code == 200
+    for path in ("/metrics", "/metrics/targets"):
+        assert cluster.client.get(path, headers=bearer(cluster.secrets["cart"])).status_code == 403
+
+
 def bearer(secret: str) -> dict[str, str]:
     return {"authorization": f"Bearer {secret}"}
 

@@ -86,7 +86,7 @@ def _is_protected(path: str) -> bool:
     """Return whether a path needs credentials. The dashboard's files do not: they hold no data of the site."""
     if is_omlox(path):
         return divided(path)[1] not in OPEN_PATHS
-    return (path.startswith("/api/") or path == "/metrics") and path not in OPEN_PATHS
+    return path.startswith(("/api/", "/metrics")) and path not in OPEN_PATHS
 
 
 def has_in(identity: Identity, site: str | None) -> Need:
