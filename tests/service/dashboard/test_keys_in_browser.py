@@ -54,3 +54,24 @@ def test_keys_are_made_used_and_revoked_without_a_terminal(chromium: Browser, ax
         panel.get_by_role("button", name="Revoke Early shift").click()
         expect(panel.get_by_role("button", name="Revoke Early shift")).to_be_hidden()
         assert sorted(key.name for key in keys.all().values()) == ["Anna's phone", "boss"]
+
+
+def test_where_the_service_may_not_change_its_keys_the_page_lists_them_and_names_the_command(
+    chromium: Browser, tmp_path: Path
+) -> None:
+    boss = ApiKeys(tmp_path).add("boss", Scope.ADMIN)
+    ApiKeys(tmp_path).add("Early shift", Scope.WRITE)
+    bench = live_api_bench()
+    app = bench.app(DASHBOARD, authenticator=Authenticator({SOURCE: ApiKeys(tmp_path, is_copied=True)}))
+    with (
+        running_server(app, bench.stopping) as port,
+        open_page(chromium, f"http://127.0.0.1:{port}/", reduced_motion="reduce") as page,
+    ):
+        page.page.locator("#key").fill(boss)
+        page.page.keyboard.press("Enter")
+        page.wait_for("window.dropanchor?.status() === 'live'")
+        page.page.get_by_role("button", name="Display").click()
+        panel = page.page.get_by_role("region", name="Keys")
+        expect(panel.get_by_role("list")).to_contain_text("Early shift: write, without an end")
+        expect(panel).to_contain_text("Make and revoke them with `dropanchor key`")
+        expect(panel.get_by_role("button")).to_have_count(0)
