@@ -270,6 +270,7 @@ def test_prometheus_reaches_the_shards_and_the_api_nodes_that_its_settings_name(
     shards, nodes = yaml.safe_load(PROMETHEUS.read_text())["scrape_configs"]
     (discovery,) = shards["http_sd_configs"]
     url = urlsplit(discovery["url"])
+    assert discovery["authorization"]["type"] == "Bearer"
     (service,) = of_kind("Service")[1:]
     assert url.hostname == f"{service['metadata']['name']}.dropanchor.svc"
     assert url.hostname in settings["http"]["allowed_hosts"]
