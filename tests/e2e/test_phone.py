@@ -24,7 +24,7 @@ SENSORS = {
 }
 PHONE, SAMPLES = "/api/v1/ingest/sensor-logger", "/api/v1/ingest/samples"
 PHYPHOX = "/api/v1/ingest/phyphox"
-TAGS = ("anna", "every-second", "phyphox", "no-numbers", "socket", "again", "gap")
+TAGS = ("anna", "phyphox", "no-numbers", "socket", "again", "gap")
 """One for each test that shares the service."""
 
 
@@ -64,29 +64,6 @@ def test_a_phone_and_ranges_from_elsewhere_for_the_same_tag_become_a_pose(servic
     assert set(status["rejected"]) == {"late"}  # the message that the next one overtook
     assert status["rejected"]["late"] < 300
     assert pose["anchor"] == "7"
-
-
-def test_a_phone_that_posts_every_second_has_poses_that_come_a_second_later(service: Running) -> None:
-    seconds, step_ns = 12, 100_000_000
-    start_ns = time.time_ns()
-    walk = straight_north(10 * seconds, start_ns + seconds * 10 * step_ns).ranges
-    batches = list(recording(seconds, SENSORS, start_ns=start_ns))
-    poses = []
-    for number, distance in enumerate(walk):
-        time.sleep(max(0.0, (distance.t_ns - time.time_ns()) * 1e-9))
-        content = encode_json(Frame(ranges=[distance], sequence=number, boot_id=7))
-        service.ask("POST", f"{SAMPLES}?tag=every-second", content=content, headers={"content-type": ENCODING_JSON})
-        if number % 10 == 9:
-            service.ask("POST", f"{PHONE}?tag=every-second", content=batches[number // 10])
-        if number % 10 == 5 and number > 80:
-            poses.append(service.get("/api/v1/tags/every-second/pose"))
-    status = service.get("/api/v1/tags/every-second")
-    assert len(poses) == 4
-    assert {pose["state"] for pose in poses} <= {"tracking", "ambiguous"}
-    assert not any(pose["hint"].startswith(("No ", "The motion", "Samples")) for pose in poses)
-    assert 1.0 < status["lag_s"] < 2.0
-    assert status["rejected"] == {}
-    assert status["used"] == status["arrived"]
 
 
 def test_an_experiment_of_phyphox_and_ranges_from_elsewhere_become_a_pose(service: Running) -> None:

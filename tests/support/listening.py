@@ -8,7 +8,7 @@ import zenoh.ext
 
 from dropanchor_schemas import decode_json, keys
 from dropanchor_schemas.wire import ENCODING_PACKED, Frame, decode_packed, payload_encoding
-from support.zenoh_router import connected_session
+from support.zenoh_router import connected_session, make_known
 
 
 class ReceivedFrames:
@@ -36,7 +36,7 @@ def listening(endpoint: str, site: str = "default") -> Iterator[ReceivedFrames]:
     received = ReceivedFrames()
     everything = keys.all_tags(site, "samples")
     with connected_session(endpoint) as session, session.declare_subscriber(everything, received.on_message):
-        list(session.get("nobody/answers", timeout=1.0))  # after this round trip the router knows the subscription
+        make_known(session)
         yield received
 
 
@@ -50,5 +50,5 @@ def listening_with_recovery(endpoint: str, site: str = "default") -> Iterator[Re
         connected_session(endpoint) as session,
         zenoh.ext.declare_advanced_subscriber(session, everything, received.on_message, recovery=recovery),
     ):
-        list(session.get("nobody/answers", timeout=1.0))
+        make_known(session)
         yield received

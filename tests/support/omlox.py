@@ -12,6 +12,7 @@ from fastapi import FastAPI
 from websockets.sync.client import ClientConnection, connect
 
 from dropanchor_schemas.site import Anchor, Georeference, Site
+from dropanchor_service.api.http.limits import GuardedProtocol
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.security.identity import Authenticator
@@ -78,8 +79,8 @@ class OmloxBench:
         return str(trackable["id"])
 
     @contextmanager
-    def running(self) -> Iterator[int]:
-        with running_server(self.app, self.poses.stopping) as port:
+    def running(self, protocol: type[GuardedProtocol] = GuardedProtocol) -> Iterator[int]:
+        with running_server(self.app, self.poses.stopping, protocol=protocol) as port:
             yield port
 
 

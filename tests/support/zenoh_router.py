@@ -77,6 +77,11 @@ def connected_session(endpoint: str) -> Iterator[zenoh.Session]:
         yield session
 
 
+def make_known(session: zenoh.Session) -> None:
+    """Return once the router knows all that the session has declared: after a round trip."""
+    list(session.get("nobody/answers", timeout=PATIENCE_S))
+
+
 def start_router_process(endpoint: str) -> subprocess.Popen[str]:
     """Start a router in a process of its own, which a test can kill. The caller ends it."""
     command = [sys.executable, "-c", _ROUTER_PROGRAM, configuration("router", [endpoint])]

@@ -13,7 +13,7 @@ from dropanchor_schemas.wire import ENCODING_JSON, Frame, RangeSample, Reason, e
 from dropanchor_tag_client import TagClient, Upkeep
 from dropanchor_tag_client.host import host_health, program
 from dropanchor_tag_client.spooling import first_ns
-from support.zenoh_router import connected_session, free_endpoint, router_process, wait_until
+from support.zenoh_router import connected_session, free_endpoint, make_known, router_process, wait_until
 
 T = 1_760_000_000_000_000_000
 FIVE_RANGES = [RangeSample(T + i, 1, 1.0) for i in range(5)]
@@ -30,7 +30,7 @@ def reports(endpoint: str) -> Iterator[list[tuple[str, str, dict[str, Any]]]]:
             lambda m: received.append((str(m.key_expr), str(m.encoding), json.loads(bytes(m.payload)))),
         ),
     ):
-        list(session.get("nobody/answers", timeout=1.0))
+        make_known(session)
         yield received
 
 

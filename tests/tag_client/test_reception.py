@@ -21,7 +21,7 @@ from dropanchor_tag_client.sources.modules.report import Range, Report
 from dropanchor_tag_client.sources.modules.status_log import StatusLog
 from support.patience import PATIENCE_S
 from support.secured import SecuredSite, secured_site
-from support.zenoh_router import wait_until
+from support.zenoh_router import make_known, wait_until
 
 LINE = b'{"anchor": 1, "range_m": 3.5}\n'
 ONES = "the credentials in .*one are of tag 'one' in site 'default'"
@@ -157,7 +157,7 @@ def test_a_tag_that_the_router_does_not_know_yet_hears_of_the_restart_that_it_ne
 ) -> None:
     heard: list[object] = []
     with site.session("service") as service, service.declare_subscriber(all_tags("default", "samples"), heard.append):
-        list(service.get("nobody/answers", timeout=1.0))
+        make_known(service)
         assert run(monkeypatch, recording, ["publish", "--credentials", str(site.folder.bundle(tag))]) == code
     said = capsys.readouterr().err
     assert (f"{NOBODY} {tag}: does the service run, and was the router restarted" in said) == (code == 1)

@@ -24,7 +24,7 @@ from support.commands import python, start_python
 from support.ingest import IngestBench
 from support.magnetism import FIELD_UT, Errors, rotation, samples
 from support.patience import PATIENCE_S
-from support.zenoh_router import connected_session, wait_until
+from support.zenoh_router import connected_session, make_known, wait_until
 
 FOUND = Calibration((0.1, 0.2, 0.3), 2.0, True, (1.0, 2.0, 3.0), ((1.0, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 2.0)))
 
@@ -144,7 +144,7 @@ def test_lines_are_calibrated_into_a_folder_and_a_program_with_it_publishes_corr
     received: list[zenoh.Sample] = []
     with connected_session(router_endpoint) as session:
         session.declare_subscriber(keys.all_tags("default", "samples"), received.append)
-        list(session.get("nobody/answers", timeout=1.0))
+        make_known(session)
         arguments = ("--tag", "a", "--connect", router_endpoint, "--calibration", str(tmp_path))
         sent = python("-m", "dropanchor_tag_client", "publish", *arguments, text_input=line(measured[-1]))
         assert sent.returncode == 0, sent.stderr

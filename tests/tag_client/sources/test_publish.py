@@ -13,7 +13,7 @@ from dropanchor_tag_client.sources.publish import publish_lines
 from support.commands import python, start_python
 from support.listening import ReceivedFrames, listening
 from support.patience import PATIENCE_S
-from support.zenoh_router import connected_session, wait_until
+from support.zenoh_router import connected_session, make_known, wait_until
 
 T = 1_760_000_000_000_000_000
 
@@ -151,7 +151,7 @@ def test_a_line_about_the_tag_is_reported_as_its_health(router_endpoint: str) ->
         session.declare_subscriber(key, lambda message: heard.append(bytes(message.payload))),
         TagClient("a", connect=router_endpoint) as tag,
     ):
-        list(session.get("nobody/answers", timeout=1.0))
+        make_known(session)
         assert publish_lines(tag, io.BytesIO(lines), errors) == 2
         wait_until(lambda: heard)
     assert [json.loads(payload) for payload in heard] == [{"version": 1, "battery_fraction": 0.5, "firmware": "1.2"}]
