@@ -1,6 +1,5 @@
 """The files of a source: a single file, those of a folder, or those of a zip archive."""
 
-import gzip
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -10,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO, cast
 
 from dropanchor_service.importing.readings import ImportingError
+from dropanchor_tag_client.recording.bounded import require_plausible, unpacked
 
 MAX_FILES = 10_000
 ZIP_MAGIC = b"PK\x03\x04"
@@ -34,12 +34,11 @@ class File:
         try:
             if self.member is not None:
                 with zipfile.ZipFile(self.path) as archive, archive.open(self.member) as inner:
+                    info = archive.getinfo(self.member)
+                    require_plausible(f"{self.path}: {self.name}", info.compress_size, info.file_size)
                     yield cast("BinaryIO", inner)
-            elif self.name.endswith(".gz"):
-                with gzip.open(self.path) as unpacked:
-                    yield cast("BinaryIO", unpacked)
             else:
-                with self.path.open("rb") as file:
+                with unpacked(self.path) as file:
                     yield file
         except (OSError, EOFError, zipfile.BadZipFile, RuntimeError, NotImplementedError, zlib.error) as error:
             raise ImportingError(f"{self.path}: {self.name} cannot be read: {error}") from error

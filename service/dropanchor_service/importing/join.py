@@ -1,7 +1,7 @@
 """Join what the sources hold: accelerations and fields at the times of the gyroscope, and all on one clock."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 
 import numpy as np
@@ -13,8 +13,6 @@ from dropanchor_service.importing.readings import (
     Position,
     Ranges,
     Readings,
-    headings_of,
-    ranges_of,
 )
 from dropanchor_service.importing.streams import Stream
 from dropanchor_tag_client.sources.axes import Mounting
@@ -50,8 +48,11 @@ class Joined:
     t0_ns: int
 
 
-def merged(parts: Sequence[tuple[str, Readings]]) -> Readings:
-    """Return the readings of all sources, each with its name. Raises ImportingError where two hold the same."""
+def merged(parts: Sequence[tuple[str, Readings]], of_one_bag: bool = False) -> Readings:
+    """Return the readings of all sources, each with its name. Raises ImportingError where two hold the same.
+
+    of_one_bag: they are topics that were chosen, on one clock, and may have ranges to the same anchor.
+    """
     whole = Readings()
     for source, part in parts:
         for sensor in ("acc", "gyro", "mag", "pressure"):
@@ -62,10 +63,10 @@ def merged(parts: Sequence[tuple[str, Readings]]) -> Readings:
                 )
             if len(stream):
                 setattr(whole, sensor, stream)
-        whole.ranges = ranges_of(*_both(whole.ranges, part.ranges))
-        whole.headings = headings_of(
-            *(np.concatenate(pair) for pair in zip(*map(_columns, (whole.headings, part.headings)), strict=True))
-        )
+        if not of_one_bag:
+            _require_apart(whole, part, source)
+        whole.ranges = _both_ranges(whole.ranges, part.ranges)
+        whole.headings = _both_headings(whole.headings, part.headings)
         whole.anchors |= part.anchors
         whole.notes += part.notes
         whole.left_out.add_all(part.left_out)
@@ -138,14 +139,32 @@ def _field(mag: Stream, t_ns: Array) -> Array:
     return np.where(usable[:, None], values, np.nan)
 
 
-def _both(a: Ranges, b: Ranges) -> tuple[Array, tuple[str, ...], Array, Array]:
-    return (
-        np.concatenate([a.t_ns, b.t_ns]),
-        (*a.anchors, *b.anchors),
-        np.concatenate([a.range_m, b.range_m]),
-        np.concatenate([a.std_m, b.std_m]),
-    )
+def _require_apart(a: Readings, b: Readings, source: str) -> None:
+    """Raise ImportingError for what two sources measured at the same time: a clock began anew, or one is a copy."""
+    pairs = {"headings": (a.headings.t_ns, b.headings.t_ns)}
+    for anchor in sorted(set(a.ranges.anchors) & set(b.ranges.anchors)):
+        pairs[f"ranges to {anchor}"] = _to(anchor, a.ranges), _to(anchor, b.ranges)
+    for what, (one, other) in pairs.items():
+        if len(one) and len(other) and one[0] <= other[-1] and other[0] <= one[-1]:
+            raise ImportingError(
+                f"{source} and another source have {what} at the same time. If a clock was set or a device started "
+                "anew, import them one by one; leave out a copy; say which anchor is which with --map range.ID=COLUMN"
+            )
 
 
-def _columns(headings: Headings) -> tuple[Array, Array, Array]:
-    return headings.t_ns, headings.yaw_rad, headings.std_rad
+def _to(anchor: str, ranges: Ranges) -> Array:
+    t_ns: Array = ranges.t_ns[np.array([name == anchor for name in ranges.anchors])]
+    return t_ns
+
+
+def _both_ranges(a: Ranges, b: Ranges) -> Ranges:
+    t_ns, anchors = np.concatenate([a.t_ns, b.t_ns]), (*a.anchors, *b.anchors)
+    order = np.argsort(t_ns, kind="stable")
+    names = tuple(anchors[i] for i in order.tolist())
+    range_m, std_m = (np.concatenate(pair)[order] for pair in ((a.range_m, b.range_m), (a.std_m, b.std_m)))
+    return Ranges(t_ns[order], names, range_m, std_m)
+
+
+def _both_headings(a: Headings, b: Headings) -> Headings:
+    order = np.argsort(np.concatenate([a.t_ns, b.t_ns]), kind="stable")
+    return Headings(*(np.concatenate([getattr(a, f.name), getattr(b, f.name)])[order] for f in fields(Headings)))

@@ -1,16 +1,27 @@
 """What a source holds: readings in SI units and the axes of the tag, and what was found on the way."""
 
+from array import array
 from collections.abc import Sequence, Sized
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.streams import Stream, make_stream, no_readings
+from dropanchor_tag_client.recording.columns import RANGE as ANY_FILE
+from dropanchor_tag_client.recording.order import in_order
+from dropanchor_tag_client.recording.recording import Rows
+from dropanchor_tag_client.recording.table import Table
+from dropanchor_tag_client.recording.units import LATEST_S
 
 ACC, GYRO, MAG, RANGE, HEADING, TIME = "acc", "gyro", "mag", "range", "heading", "time"
 PRESSURE = "pressure"
 MAX_EXAMPLES = 3
+NS_PER_S = 1_000_000_000
+LATEST_NS = round(
+    LATEST_S * NS_PER_S
+)  # a time may be nonsense: `bounded` keeps it within int64, `ordered` leaves it out
 
 Position = tuple[float, float, float]
 
@@ -56,9 +67,10 @@ class Unit:
 
 
 class LeftOut:
-    """Counts of rows that were left out, by source and reason, with the first few lines."""
+    """Counts of rows that were left out, by source and reason, with the first few lines. notes: on their times."""
 
     def __init__(self) -> None:
+        self.notes: list[str] = []
         self._lines: dict[tuple[str, str], list[int]] = {}
         self._counts: dict[tuple[str, str], int] = {}
 
@@ -72,13 +84,14 @@ class LeftOut:
             lines.append(line)
 
     def add_all(self, other: "LeftOut") -> None:
+        self.notes += other.notes
         for (source, reason), count in other._counts.items():
             self.add(source, reason, count=count)
             known = self._lines[source, reason]
             known += other._lines[source, reason][: MAX_EXAMPLES - len(known)]
 
     def sentences(self) -> list[str]:
-        return [self._sentence(*key) for key in self._counts]
+        return [*dict.fromkeys(self.notes), *(self._sentence(*key) for key in self._counts)]
 
     def _sentence(self, source: str, reason: str) -> str:
         count, lines = self._counts[source, reason], self._lines[source, reason]
@@ -129,20 +142,52 @@ class Readings:
         return not any(map(len, held))
 
 
-def stream_of(t_ns: Array, values: Array, source: str, what: str, left_out: LeftOut) -> Stream:
-    """Return the readings in order of time, one for each time. Count those whose time another has."""
-    stream = make_stream(t_ns, values)
-    left_out.add(source, f"{what} with the time of another", count=len(t_ns) - len(stream))
+def bounded_ns(seconds: Array) -> Array:
+    """Return ns, of nonsense the latest time that there is."""
+    ns: Array = np.rint(np.clip(seconds, -LATEST_S, LATEST_S) * NS_PER_S).astype(np.int64)
+    return ns
+
+
+def stream_of(t_ns: Array, values: Array, rows: Rows, what: str, left_out: LeftOut) -> Stream:
+    """Return the readings in order of time, one for each time. Count those whose time another has.
+
+    rows: where each of them stands. Raises RecordingError, as the two below, where the time goes back.
+    """
+    t_ns, order = ordered(t_ns, rows, what, left_out)
+    stream = make_stream(t_ns, values[order])
+    left_out.add(rows.file, f"{what} with the time of another", count=len(t_ns) - len(stream))
     return stream
 
 
-def ranges_of(t_ns: Array, anchors: Sequence[str], range_m: Array, std_m: Array) -> Ranges:
-    """Return the ranges in order of time."""
-    order = np.argsort(t_ns, kind="stable")
-    return Ranges(t_ns[order], tuple(anchors[i] for i in order.tolist()), range_m[order], std_m[order])
+def ranges_of(t_ns: Array, anchors: Sequence[str], columns: Sequence[Array], rows: Rows, left_out: LeftOut) -> Ranges:
+    """Return the ranges in order of time. columns: range_m, std_m. Those to one anchor stand in the order of time."""
+    t_ns, order = ordered(t_ns, rows, "ranges", left_out, anchors)
+    range_m, std_m = (column[order] for column in columns)
+    return Ranges(t_ns, tuple(anchors[i] for i in order.tolist()), range_m, std_m)
 
 
-def headings_of(t_ns: Array, yaw_rad: Array, std_rad: Array) -> Headings:
-    """Return the headings in order of time."""
-    order = np.argsort(t_ns, kind="stable")
-    return Headings(t_ns[order], yaw_rad[order], std_rad[order])
+def headings_of(t_ns: Array, columns: Sequence[Array], rows: Rows, left_out: LeftOut) -> Headings:
+    """Return the headings in order of time. columns: yaw_rad, std_rad."""
+    t_ns, order = ordered(t_ns, rows, "headings", left_out)
+    return Headings(t_ns, *(column[order] for column in columns))
+
+
+def ordered(t_ns: Array, rows: Rows, holds: str, left_out: LeftOut, series: Sequence[str] = ()) -> tuple[Array, Array]:
+    """Return the times in order, and the places of their rows, by the rules of all recordings. Raises RecordingError.
+
+    series: which rows follow each other.
+    """
+    if not len(t_ns):
+        return t_ns, np.empty(0, np.int64)
+    middle_ns = int(np.median(t_ns))
+    if abs(middle_ns) >= LATEST_NS:
+        raise ImportingError(
+            f"{rows.place(0)}: the time of this and most other {holds} is after 2116: in which unit is it?"
+        )
+    since_s = (t_ns - middle_ns) / NS_PER_S
+    table = Table(ANY_FILE._replace(holds=holds), Path(rows.file), t=array("d", since_s), texts=list(series), rows=rows)
+    kept, notes = in_order(table)
+    left_out.notes += notes
+    order = np.array(kept, np.int64)
+    continued_s = np.asarray(table.t) - since_s  # behind a counter that wrapped
+    return (t_ns + np.rint(continued_s * NS_PER_S).astype(np.int64))[order], order

@@ -1,6 +1,5 @@
 """Read recordings turn by turn: the messages and the poses. Read a torn file up to the tear."""
 
-import struct
 from base64 import b64decode
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -8,21 +7,20 @@ from pathlib import Path
 from typing import Any
 
 import orjson
-import zstandard
-from mcap.exceptions import McapError
 from mcap.records import Channel, Header, Message, Metadata
-from mcap.stream_reader import StreamReader
 
 from dropanchor_schemas.keys import id_from_chunk
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
 from dropanchor_service.recording.mcap_file import METADATA, PROFILE
 from dropanchor_service.recording.messages import ESTIMATE, SITE_TOPIC
 from dropanchor_service.recording.output import JSON, PACKED
+from dropanchor_service.recording.unpacking import READ_ERRORS, TooLargeError, mcap_records
 from dropanchor_service.store.site_values import SiteDocument
 from dropanchor_tag_client.recording import RecordingError
+from dropanchor_tag_client.recording.order import MAX_DISORDER_S, goes_back
+from dropanchor_tag_client.recording.units import LATEST_S
 
-_READ_ERRORS = (McapError, struct.error, zstandard.ZstdError, RuntimeError, ValueError, EOFError)
-_RECORD_LIMIT = 2**30
+NS_PER_S = 1_000_000_000
 
 
 @dataclass
@@ -55,12 +53,15 @@ class RecordingReader:
         """Yield the turns in order. Raises RecordingError when the file is not a recording of this service."""
         topics: dict[int, str] = {}
         turn: Turn | None = None
+        number = 0
         for record in self._records():
             if isinstance(record, Metadata) and record.name == METADATA:
                 self.metadata = record.metadata
             elif isinstance(record, Channel):
                 topics[record.id] = record.topic
             elif isinstance(record, Message):
+                number += 1
+                self._check_time(record, f"{self.path} message {number}", turn)
                 if turn is None or record.log_time != turn.t_ns:
                     if turn is not None:
                         yield turn
@@ -72,23 +73,31 @@ class RecordingReader:
         if turn is not None:
             yield turn
 
+    def _check_time(self, message: Message, place: str, turn: Turn | None) -> None:
+        """Raise RecordingError for a time that no clock of the service shows."""
+        if max(message.log_time, message.publish_time) >= LATEST_S * NS_PER_S:
+            raise RecordingError(f"{place}: the time is after 2116: the file is damaged")
+        back_s = (turn.t_ns - message.log_time) / NS_PER_S if turn is not None else 0.0
+        if back_s > MAX_DISORDER_S:
+            raise RecordingError(goes_back(place, back_s))
+
     def _records(self) -> Iterator[Any]:
-        with self.path.open("rb") as file:
-            records = StreamReader(file, validate_crcs=True, record_size_limit=_RECORD_LIMIT).records
-            is_recording = False
-            while True:
-                try:
-                    record = next(records, None)
-                except _READ_ERRORS as error:
-                    self.read_error = str(error) or type(error).__name__
-                    record = None
-                if isinstance(record, Header):
-                    is_recording = record.profile == PROFILE
-                if not is_recording:
-                    raise RecordingError(f"{self.path} is not a recording of this service")
-                if record is None:
-                    return
-                yield record
+        records, is_recording = mcap_records(self.path, validate_crcs=True), False
+        while True:
+            try:
+                record = next(records, None)
+            except TooLargeError:
+                raise
+            except READ_ERRORS as error:
+                self.read_error = str(error) or type(error).__name__
+                record = None
+            if isinstance(record, Header):
+                is_recording = record.profile == PROFILE
+            if not is_recording:
+                raise RecordingError(f"{self.path} is not a recording of this service")
+            if record is None:
+                return
+            yield record
 
 
 def _add_to(turn: Turn, topic: str, message: Message) -> None:

@@ -1,36 +1,34 @@
 """Read the text of CSV files, and say why a table is none of ours."""
 
 import codecs
-import gzip
+import io
 import re
 import shlex
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from dropanchor_tag_client.recording.bounded import lines_of, unpacked
 from dropanchor_tag_client.recording.recording import RecordingError
 
 _UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+_NO_TEXT = ("\0", "\ufffd")
 _SEPARATORS = {";": "semicolons (;)", "\t": "tabs", "|": "bars (|)"}
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*")
 
 
-def text_of(path: Path) -> str:
-    """Return the text of a plain or gzipped file in UTF-8, or in UTF-16 with a byte order mark."""
+def lines_of_text(path: Path) -> Iterator[str]:
+    """Yield the lines of a plain or gzipped file in UTF-8, or in UTF-16 with a byte order mark."""
     try:
-        raw = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
+        with unpacked(path) as file:
+            encoding = "utf-16" if file.peek(2).startswith(_UTF_16) else "utf-8-sig"
+            text = io.TextIOWrapper(file, encoding, errors="replace", newline="")
+            for number, line in enumerate(lines_of(text, path), 1):
+                if any(mark in line for mark in _NO_TEXT):
+                    raise RecordingError(f"{path} line {number} cannot be read: this is not text in UTF-8")
+                yield line
     except (OSError, EOFError, zlib.error) as error:
         raise RecordingError(f"{path} cannot be read: {error}") from error
-    encoding = "utf-16" if raw.startswith(_UTF_16) else "utf-8-sig"
-    try:
-        text = raw.decode(encoding)
-        end = text.find("\0")
-    except UnicodeDecodeError as error:
-        text, end = raw[: error.start].decode(encoding, "replace"), error.start
-    if end >= 0:
-        line = text[:end].count("\n") + 1
-        raise RecordingError(f"{path} line {line} cannot be read: this is not text in UTF-8")
-    return text
 
 
 def why_not_ours(header: str, needed: Iterable[str]) -> str | None:

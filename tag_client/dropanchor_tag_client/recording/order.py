@@ -1,7 +1,11 @@
-"""Bring the rows of a table in order of time, or say where its clock goes wrong."""
+"""The rules of times: bring the rows of a table in order, or say where its clock goes wrong.
+
+Every reader of recordings uses them, those of foreign data too.
+"""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from statistics import median_low
 from typing import NamedTuple
 
 from dropanchor_tag_client.recording.recording import RecordingError
@@ -11,6 +15,7 @@ from dropanchor_tag_client.recording.units import DW1000, DW1000_TICKS, interval
 MAX_DISORDER_S = 1.0  # between the sensors of one file
 MAX_GLITCHES = 3  # single rows with a wrong time
 LONG_GAP_S = 86_400.0
+FAR_S = 30 * 86_400.0  # from most other rows: a device whose clock is not set sends 1970, or nonsense
 MIN_SHARED = 0.05  # share of the rows of a table
 
 
@@ -28,28 +33,52 @@ COUNTERS = (
 )
 
 
-def put_in_order(table: Table) -> list[str]:
-    """Sort the rows by time. Return sentences on what was wrong with the times.
+class Ordered(NamedTuple):
+    """rows: those that are used, in order of time. notes: sentences on what was wrong with the times."""
 
-    A counter that wraps is continued. Up to MAX_GLITCHES rows with a wrong time are left out. Raises RecordingError
-    where the time goes back by more than MAX_DISORDER_S otherwise. Ranges are judged for each anchor.
+    rows: list[int]
+    notes: list[str]
+
+
+def put_in_order(table: Table) -> list[str]:
+    """Sort the rows of the table by the rules of `in_order`. Return its sentences. Raises RecordingError."""
+    rows, notes = in_order(table)
+    table.take(rows)
+    return notes
+
+
+def in_order(table: Table) -> Ordered:
+    """Return the rows by their times in s. Continues a counter that wraps, in the times of the table.
+
+    Rows far from most others and up to MAX_GLITCHES with a wrong time are left out. Raises RecordingError where the
+    time goes back by more than MAX_DISORDER_S otherwise. Ranges are judged for each anchor.
     """
     notes: list[str] = []
+    for series in _series(table, range(len(table))):
+        notes += _unwrap(table, series, [table.t[row] for row in series])
+    near = _near(table, notes)
     kept: list[int] = []
-    for series in _series(table):
+    for series in _series(table, near):
         kept += _in_order(table, series, notes)
     notes += _shared(table, kept)
-    table.take(sorted(sorted(kept), key=table.t.__getitem__))
-    return list(dict.fromkeys(notes))
+    return Ordered(sorted(sorted(kept), key=table.t.__getitem__), list(dict.fromkeys(notes)))
 
 
-def _series(table: Table) -> list[list[int]]:
+def _near(table: Table, notes: list[str]) -> list[int]:
+    """Return the rows near most others. Adds a sentence on the rest."""
+    middle = median_low(table.t) if len(table) else 0.0
+    is_near = [abs(t - middle) <= FAR_S for t in table.t]
+    if not all(is_near):
+        place = table.rows.place(is_near.index(False))
+        notes.append(f"{place}: a time more than 30 days from most others: left out{_more(is_near.count(False) - 1)}")
+    return [row for row, near in enumerate(is_near) if near]
+
+
+def _series(table: Table, rows: Iterable[int]) -> list[list[int]]:
     """Return the rows of each anchor, or all rows."""
-    if not table.texts:
-        return [list(range(len(table)))]
     by_text: dict[str, list[int]] = {}
-    for row, text in enumerate(table.texts):
-        by_text.setdefault(text, []).append(row)
+    for row in rows:
+        by_text.setdefault(table.texts[row] if table.texts else "", []).append(row)
     return list(by_text.values())
 
 
@@ -59,7 +88,7 @@ def _in_order(table: Table, rows: list[int], notes: list[str]) -> list[int]:
     if _is_sorted(t):
         notes += _jump_ahead(table, rows, t)
         return rows
-    notes += _unwrap(table, rows, t)
+    notes += _unwrap(table, rows, t)  # again, now without what is far
     glitches = _glitches(t)
     if glitches:
         first = table.rows.place(rows[min(glitches)])
@@ -70,7 +99,7 @@ def _in_order(table: Table, rows: list[int], notes: list[str]) -> list[int]:
     newest = t[0]
     for row, value in zip(rows, t, strict=True):
         if newest - value > MAX_DISORDER_S:
-            raise RecordingError(_goes_back(table, row, newest - value))
+            raise RecordingError(goes_back(f"{table.path} {table.rows.unit} {table.rows.numbers[row]}", newest - value))
         worst, newest = max(worst, newest - value), max(newest, value)
     if worst:
         notes.append(f"{table.rows.file}: rows were up to {worst:.3g} s out of order: sorted by time")
@@ -85,11 +114,11 @@ def _is_sorted(t: Sequence[float]) -> bool:
     return all(a <= b for a, b in itertools.pairwise(t))
 
 
-def _goes_back(table: Table, row: int, by_s: float) -> str:
+def goes_back(place: str, by_s: float) -> str:
+    """Return what is wrong with a time before the one that stands before it, and what to do."""
     return (
-        f"{table.path} {table.rows.unit} {table.rows.numbers[row]}: the time goes back by {by_s:.1f} s. A recording "
-        f"needs one clock that runs forward in all its files: split it there into two recordings, or add {by_s:.1f} s "
-        "to the times from there on"
+        f"{place}: the time goes back by {by_s:.1f} s. A recording needs one clock that runs forward in all its files: "
+        f"split it there into two recordings, or add {by_s:.1f} s to the times from there on"
     )
 
 

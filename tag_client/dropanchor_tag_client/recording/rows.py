@@ -1,14 +1,14 @@
 """Yield the rows of a table with their numbers in the file, from CSV, JSON lines or Parquet."""
 
 import csv
-import io
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from dropanchor_tag_client.recording.bounded import require_plausible
 from dropanchor_tag_client.recording.columns import TIMES, Columns
-from dropanchor_tag_client.recording.csv_text import import_hint, text_of, why_not_ours
+from dropanchor_tag_client.recording.csv_text import import_hint, lines_of_text, why_not_ours
 from dropanchor_tag_client.recording.recording import Place, RecordingError
 
 Row = Mapping[str, Any]
@@ -47,7 +47,7 @@ def _check(where: Place, file: Columns, names: set[str], header: str = "") -> No
 
 def _csv_rows(path: Path, file: Columns) -> Iterator[tuple[int, Row]]:
     """Skip empty lines and those that begin with #."""
-    reader = csv.reader(io.StringIO(text_of(path), newline=""), skipinitialspace=True)
+    reader = csv.reader(lines_of_text(path), skipinitialspace=True)
     names: list[str] | None = None
     try:
         for values in reader:
@@ -68,7 +68,7 @@ def _csv_rows(path: Path, file: Columns) -> Iterator[tuple[int, Row]]:
 
 def _json_rows(path: Path, file: Columns) -> Iterator[tuple[int, Row]]:
     is_checked = False
-    for number, line in enumerate(text_of(path).split("\n"), start=1):
+    for number, line in enumerate(lines_of_text(path), start=1):
         if not line.strip():
             continue
         try:
@@ -92,7 +92,9 @@ def _parquet_rows(path: Path, file: Columns) -> Iterator[tuple[int, Row]]:
             f"{path}: Parquet needs the extra `parquet`: pip install 'dropanchor-service[parquet]'"
         ) from error
     try:
-        table = pq.ParquetFile(path).read()
+        source = pq.ParquetFile(path)
+        require_plausible(path, path.stat().st_size, 8 * source.metadata.num_rows * len(source.schema_arrow))
+        table = source.read()
     except (OSError, pa.ArrowException) as error:
         raise RecordingError(f"{path} cannot be read: {error}") from error
     names = [name for name in table.column_names if name in {*file.numbers, file.text, *TIMES}]

@@ -68,12 +68,17 @@ def _units_of(tables: Sequence[Table], declared: Unit) -> list[Unit]:
 
 def _plausible(table: Table, declared: Unit) -> list[Unit]:
     """Return the plausible units of a table, the declared one first. Raises RecordingError if there are none."""
-    last = max(map(abs, table.t))
+    usual = median(map(abs, table.t))  # single times may be nonsense
     units = [declared, *(unit for unit in UNITS.values() if unit != declared)]
-    possible = [unit for unit in units if last / unit.per_second < LATEST_S]
+    possible = [unit for unit in units if usual / unit.per_second < LATEST_S]
+    if not possible:
+        raise RecordingError(
+            f"{table.path} {table.rows.unit} {table.rows.numbers[0]}: {table.time} is {table.t[0]:.10g}, which is "
+            "after 2116 in any unit. Write the times in seconds"
+        )
     interval = interval_of(table.t)
     if interval is None or table.file.interval_s is None:
-        return possible or [UNITS["t_ns"]]
+        return possible
     low, high = table.file.interval_s
     fitting = [unit for unit in possible if low <= interval / unit.per_second <= high]
     if _wraps_like_a_dw1000(table.t, interval) and low <= interval / DW1000.per_second <= high:

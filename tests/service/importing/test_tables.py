@@ -212,7 +212,7 @@ def test_rows_from_before_the_clock_was_set_are_left_out(run: Import) -> None:
     rows = "".join(f"{t},A,5\n" for t in (0, 100, *range(1760000000000, 1760000001000, 100)))
     ended = run(run.file("uwb.csv", "time_ms,anchor,range\n" + rows))
     assert len(ended.rows("range")) == 10
-    assert "uwb.csv: 2 left out: the time is more than 30 days from most others (lines 2, 3)" in ended.printed
+    assert "uwb.csv line 2: a time more than 30 days from most others: left out, and 1 more like it" in ended.printed
 
 
 def test_the_axes_of_the_imu_can_be_turned(run: Import) -> None:

@@ -48,11 +48,6 @@ def test_a_counter_that_wraps_is_unwrapped_and_the_line_is_named() -> None:
     assert times.notes == ["micros: the counter wraps at 2^32 (line 7): unwrapped 1 times"]
 
 
-def test_a_time_that_goes_back_is_named_with_its_line() -> None:
-    times = times_of([0, 10, 5, 15], "s", "t", [2, 3, 4, 5])
-    assert "t: time goes back by 5.0 s in line 4" in times.notes[0]
-
-
 @pytest.mark.parametrize(
     ("text", "ns", "has_zone"),
     [

@@ -1,24 +1,18 @@
 """MCAP files of any writer: messages of ROS 1 and ROS 2, JSON and protobuf. A torn file is read up to the tear."""
 
-import struct
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 from typing import Any
 
 import orjson
-import zstandard
-from mcap.exceptions import McapError
-from mcap.reader import make_reader
+from mcap.reader import SeekingReader
 from mcap.records import Channel, Header, Schema
 from mcap.records import Message as McapMessage
-from mcap.stream_reader import StreamReader
 
 from dropanchor_service.importing.bags.bag import NS_PER_S, Message, Topic, normal
 from dropanchor_service.importing.readings import ImportingError
-
-_READ_ERRORS = (McapError, struct.error, zstandard.ZstdError, RuntimeError, ValueError, EOFError)
-_RECORD_LIMIT = 2**30
+from dropanchor_service.recording.unpacking import MAX_RECORD, READ_ERRORS, TooLargeError, mcap_records
 
 Decode = Callable[[bytes], Any]
 
@@ -34,7 +28,7 @@ class McapBag:
         self._channels: dict[int, Channel] = {}
         counts, seconds = self._summary() or self._counted()
         if not self._channels:
-            raise ImportingError(f"{path} holds no topic")
+            raise ImportingError("; ".join([f"{path} holds no topic", *self.notes]))
         by_topic: dict[str, Topic] = {}
         for channel in self._channels.values():
             known = by_topic.get(channel.topic)
@@ -54,10 +48,10 @@ class McapBag:
         """Take the channels from the index at the end of the file; None if it has none."""
         try:
             with self._path.open("rb") as file:
-                reader = make_reader(file)
+                reader = SeekingReader(file, record_size_limit=MAX_RECORD)
                 self.profile = reader.get_header().profile
                 summary = reader.get_summary()
-        except _READ_ERRORS:
+        except READ_ERRORS:
             return None
         if summary is None or summary.statistics is None or not summary.channels:
             return None
@@ -85,14 +79,14 @@ class McapBag:
         return counts, (times[1] - times[0]) / NS_PER_S if times else 0.0
 
     def _records(self) -> Iterator[Any]:
-        with self._path.open("rb") as file:
-            try:
-                yield from StreamReader(file, record_size_limit=_RECORD_LIMIT).records
-            except _READ_ERRORS as error:
-                note = (
-                    f"{self._path.name} is cut off or damaged ({error or type(error).__name__}): it is used up to there"
-                )
-                self.notes = [note]
+        try:
+            yield from mcap_records(self._path)
+        except TooLargeError:
+            raise
+        except READ_ERRORS as error:
+            self.notes = [
+                f"{self._path.name} is cut off or damaged ({error or type(error).__name__}): it is used up to there"
+            ]
 
     def _topic(self, channel: Channel, count: int, seconds: float) -> Topic:
         schema = self._schemas.get(channel.schema_id)

@@ -1,7 +1,11 @@
 """Recordings of this service: the samples of one of their tags, as the tag sent them."""
 
-from collections.abc import Iterator, Sequence
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,6 +26,9 @@ from dropanchor_service.importing.readings import (
     stream_of,
 )
 from dropanchor_service.recording.reading import RecordingReader
+from dropanchor_tag_client.recording.recording import Rows
+
+S = TypeVar("S")
 
 Arrived = tuple[Frame, int]
 """A message, and UTC of its arrival in ns."""
@@ -46,7 +53,7 @@ def read_own(path: Path, tag: str | None) -> Readings:
     if reader.read_error is not None:
         readings.notes.append(f"{path.name} is cut off or damaged ({reader.read_error}): it is used up to there")
     chosen = _chosen(path, by_tag, tag)
-    frames = list(_on_utc(_distinct(by_tag[chosen]), readings, path.name))
+    frames = list(_on_utc(_in_sequence(by_tag[chosen]), readings, path.name))
     _fill(readings, frames, path.name, _names(site, frames))
     readings.anchors = {a.id: (a.x, a.y, a.z) for a in site.anchors} if site is not None else {}
     readings.notes.insert(0, f"{path.name}: a recording of this service, tag {chosen}")
@@ -67,14 +74,18 @@ def _chosen(path: Path, by_tag: dict[str, list[Arrived]], tag: str | None) -> st
     return tag
 
 
-def _distinct(frames: Sequence[Arrived]) -> Iterator[Arrived]:
-    """Yield each message once: a tag sends some again."""
-    known = set()
-    for frame, arrived_ns in frames:
-        number = (frame.boot_id, frame.sequence)
-        if not frame.boot_id or frame.sequence is None or number not in known:
-            known.add(number)
-            yield frame, arrived_ns
+def _in_sequence(arrived: Sequence[Arrived]) -> Iterator[Arrived]:
+    """Yield each message once, since a tag sends some again, and those of a publisher in the order of their numbers."""
+    distinct: dict[tuple[int, int], Arrived] = {}
+    for place, (frame, t_ns) in enumerate(arrived):  # without a number in the order of their arrival
+        numbered = frame.boot_id and frame.sequence is not None
+        number = (frame.boot_id or 0, frame.sequence or 0) if numbered else (0, place)
+        distinct.setdefault(number, (frame, t_ns))
+    in_order: dict[int, Iterator[tuple[int, int]]] = {}
+    for boot_id, numbers in groupby(sorted(distinct), key=itemgetter(0)):
+        in_order[boot_id] = iter(list(numbers))
+    for boot_id, _ in distinct:
+        yield distinct[next(in_order[boot_id])]
 
 
 def _on_utc(arrived: Iterator[Arrived], readings: Readings, source: str) -> Iterator[Frame]:
@@ -107,27 +118,29 @@ def _names(site: Site | None, frames: Sequence[Frame]) -> dict[int, str]:
 
 
 def _fill(readings: Readings, frames: Sequence[Frame], source: str, names: dict[int, str]) -> None:
-    imu = [sample for frame in frames for sample in frame.imu]
-    t_ns = _times(imu)
-    for name in ("acc", "gyro"):
+    left_out = readings.left_out
+    for name in ("acc", "gyro", "mag"):
+        imu, rows = _flat(([s for s in frame.imu if getattr(s, name) is not None] for frame in frames), source)
         vectors = np.array([getattr(sample, name) for sample in imu])
-        setattr(readings, name, stream_of(t_ns, vectors, source, name, readings.left_out))
-    with_field = [sample for sample in imu if sample.mag is not None]
-    values = np.array([sample.mag for sample in with_field])
-    readings.mag = stream_of(_times(with_field), values, source, "mag", readings.left_out)
-    ranges = [sample for frame in frames for sample in frame.ranges]
+        setattr(readings, name, stream_of(_times(imu), vectors, rows, name, left_out))
+    ranges, rows = _flat((frame.ranges for frame in frames), source)
     anchors = [names.get(sample.anchor, str(sample.anchor)) for sample in ranges]
     columns = (np.array([sample.range_m for sample in ranges]), np.array([sample.std_m for sample in ranges]))
-    readings.ranges = ranges_of(_times(ranges), anchors, *columns)
-    headings = [sample for frame in frames for sample in frame.headings]
-    readings.headings = headings_of(
-        _times(headings), np.array([h.heading_rad for h in headings]), np.array([h.std_rad for h in headings])
-    )
-    pressures = [sample for frame in frames for sample in frame.pressures]
+    readings.ranges = ranges_of(_times(ranges), anchors, columns, rows, left_out)
+    headings, rows = _flat((frame.headings for frame in frames), source)
+    columns = (np.array([sample.heading_rad for sample in headings]), np.array([sample.std_rad for sample in headings]))
+    readings.headings = headings_of(_times(headings), columns, rows, left_out)
+    pressures, rows = _flat((frame.pressures for frame in frames), source)
     air = np.array([(sample.pressure_pa, sample.temperature_c) for sample in pressures]).reshape(-1, 2)
-    readings.pressure = stream_of(_times(pressures), air, source, "pressures", readings.left_out)
+    readings.pressure = stream_of(_times(pressures), air, rows, "pressures", left_out)
     count = sum(len(frame.bearings) for frame in frames)
-    readings.left_out.add(source, "bearings: a recording folder has none", count=count)
+    left_out.add(source, "bearings: a recording folder has none", count=count)
+
+
+def _flat(lists: Iterable[Sequence[S]], source: str) -> tuple[list[S], Rows]:
+    """Return all samples, and the numbers of their messages."""
+    found = [(number, sample) for number, samples in enumerate(lists, 1) for sample in samples]
+    return [sample for _, sample in found], Rows(source, "message", array("q", (number for number, _ in found)))
 
 
 def _times(samples: Sequence[object]) -> Array:

@@ -39,7 +39,7 @@ def read_bag(path: Path, choice: Choice) -> Found:
             )
         parts.append((name, readings_of(table, fields)))
         found.fields[name] = fields
-    found.readings = merged(parts)
+    found.readings = merged(parts, of_one_bag=True)
     found.readings.notes = [f"{path.name}: {_summary(chosen)}", *chosen.notes, *found.readings.notes, *bag.notes]
     return found
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from dropanchor_service.importing.bags.bag import IMU, MAG, NS_PER_S, PRESSURE, RANGE, Bag, Message
 from dropanchor_service.importing.progress import shown
@@ -32,6 +32,7 @@ class TopicTable:
     """name: of the topic. kind: type of its messages. count: of messages. columns: paths of the fields, and `stamp`:
     the time of the message in ns, or of its recording if it has none."""
 
+    unit: ClassVar[str] = "message"
     name: str
     kind: str
     count: int

@@ -15,10 +15,12 @@ import numpy as np
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.files import File
 from dropanchor_service.importing.phones.phone import imu_readings
-from dropanchor_service.importing.readings import ImportingError, LeftOut, Readings, stream_of
+from dropanchor_service.importing.readings import ImportingError, LeftOut, Readings, bounded_ns, stream_of
 from dropanchor_service.importing.streams import Stream, no_readings
 from dropanchor_service.importing.tables.table import number
 from dropanchor_service.importing.tables.text_table import TextTable, read_table
+from dropanchor_service.importing.tables.times import UTC_S
+from dropanchor_tag_client.recording.recording import Rows
 from dropanchor_tag_client.sources.phones.pairing import Signs
 from dropanchor_tag_client.sources.phones.readings import GYROSCOPE, LINEAR, MAGNETOMETER, TOTAL
 
@@ -33,7 +35,6 @@ _SENSORS = {
 }
 _PRESSURES = {"pressure (hpa)": 100.0, "pressure (kpa)": 1_000.0, "pressure (pa)": 1.0}
 _META = re.compile(r"(?:^|/)meta/")
-_NS_PER_S = 1_000_000_000
 
 Starts = tuple[Array, Array]
 """Experiment time and UTC at which the experiment began or went on, s."""
@@ -90,7 +91,7 @@ def _pressures(columns: Sequence[str]) -> list[tuple[int, float]]:
 
 
 def _stream(table: TextTable, places: list[int], starts: Starts | None, left_out: LeftOut, what: str) -> Stream:
-    times, values = array("d"), array("d")
+    times, values, lines = array("d"), array("d"), array("q")
     for line, cells in table.rows(left_out):
         try:
             t, *numbers = (number(cells[place]) for place in (0, *places))
@@ -100,21 +101,21 @@ def _stream(table: TextTable, places: list[int], starts: Starts | None, left_out
             left_out.add(table.name, "a value is not a number", line)
         else:
             times.append(t)
+            lines.append(line)
             values.extend(value for value in numbers if value is not None)
     t_ns = _t_ns(np.asarray(times), starts)
-    return stream_of(t_ns, np.asarray(values).reshape(-1, len(places)), table.name, what, left_out)
+    rows = Rows(table.name, table.unit, lines)
+    return stream_of(t_ns, np.asarray(values).reshape(-1, len(places)), rows, what, left_out)
 
 
 def _t_ns(experiment_s: Array, starts: Starts | None) -> Array:
     """Return UTC by the last start before each time, or the times of the experiment."""
     if starts is None:
-        since_start: Array = np.rint(experiment_s * _NS_PER_S).astype(np.int64)
-        return since_start
+        return bounded_ns(experiment_s)
     began_s, utc_s = starts
     last = np.maximum(np.searchsorted(began_s, experiment_s, side="right") - 1, 0)
     utc_ns = np.rint(utc_s * 1e6).astype(np.int64) * 1000
-    ns: Array = utc_ns[last] + np.rint((experiment_s - began_s[last]) * _NS_PER_S).astype(np.int64)
-    return ns
+    return utc_ns[last] + bounded_ns(experiment_s - began_s[last])
 
 
 def _starts(files: Sequence[File]) -> Starts | None:
@@ -129,6 +130,8 @@ def _starts(files: Sequence[File]) -> Starts | None:
         starts = sorted(
             (float(row["experiment time"]), float(row["system time"])) for row in rows if row["event"] == "START"
         )
+        if any(not 0.0 <= utc_s < UTC_S[1] for _, utc_s in starts):
+            raise ValueError(f"it began at {starts[0][1]:.10g} s")
     except (KeyError, ValueError) as error:
         raise ImportingError(f"{file.name} holds no times of the experiment: leave it out, or export again") from error
     return (np.array([start[0] for start in starts]), np.array([start[1] for start in starts])) if starts else None

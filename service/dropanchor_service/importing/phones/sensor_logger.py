@@ -15,6 +15,8 @@ from dropanchor_service.importing.readings import ImportingError, LeftOut, Readi
 from dropanchor_service.importing.streams import Stream
 from dropanchor_service.importing.tables.table import exact_number, number
 from dropanchor_service.importing.tables.text_table import TextTable, read_table
+from dropanchor_service.importing.tables.times import bounded
+from dropanchor_tag_client.recording.recording import Rows
 from dropanchor_tag_client.sources.phones.pairing import Signs
 from dropanchor_tag_client.sources.phones.readings import SENSORS
 from dropanchor_tag_client.sources.phones.sensor_logger import PA_PER_MBAR
@@ -60,7 +62,7 @@ def _stream(table: TextTable, columns: Sequence[str], left_out: LeftOut) -> Stre
     if missing := {_TIME, *columns} - set(table.columns):
         raise ImportingError(f"{table.name} lacks the columns {', '.join(sorted(missing))} of Sensor Logger")
     places = [table.columns.index(name) for name in (_TIME, *columns)]
-    t_ns, values = array("q"), array("d")
+    t_ns, values, lines = array("q"), array("d"), array("q")
     for line, cells in table.rows(left_out):
         try:
             t, numbers = exact_number(cells[places[0]]), [number(cells[place]) for place in places[1:]]
@@ -69,10 +71,12 @@ def _stream(table: TextTable, columns: Sequence[str], left_out: LeftOut) -> Stre
         if t is None or None in numbers:
             left_out.add(table.name, "a value is not a number", line)
         else:
-            t_ns.append(int(t))
+            t_ns.append(bounded(t))
+            lines.append(line)
             values.extend(value for value in numbers if value is not None)
     vectors = np.asarray(values).reshape(-1, len(columns))
-    return stream_of(np.asarray(t_ns, np.int64), vectors, table.name, "readings", left_out)
+    rows = Rows(table.name, table.unit, lines)
+    return stream_of(np.asarray(t_ns, np.int64), vectors, rows, "readings", left_out)
 
 
 def _metadata(file: File) -> Mapping[str, str]:

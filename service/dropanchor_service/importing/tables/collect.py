@@ -7,7 +7,7 @@ from typing import Any
 from dropanchor_service.importing.readings import RANGE, LeftOut
 from dropanchor_service.importing.tables.mapping import ANCHOR, T_NSEC, VECTORS, WIDE, Fields, T, quantity_of
 from dropanchor_service.importing.tables.table import Exact, Table, exact_number, number, text_of
-from dropanchor_service.importing.tables.times import iso_ns
+from dropanchor_service.importing.tables.times import bounded, iso_ns
 from dropanchor_service.importing.tables.units import conversion
 
 ONLY_ANCHOR = "1"
@@ -92,7 +92,7 @@ class _Collector:
         self._out.times.append(found)
         self._out.lines.append(line)
         if T_NSEC in self._index:
-            self._out.seconds.append(int(number(cells[self._index[T_NSEC]]) or 0))
+            self._out.seconds.append(bounded(number(cells[self._index[T_NSEC]]) or 0))
         return True
 
     def _take_vector(self, quantity: str, kind: Kind, cells: Cells, row: int) -> None:

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import orjson
 
@@ -21,6 +21,7 @@ _MAX_LIST_BYTES = 2**30
 class JsonTable:
     """columns: the paths in the first objects. is_list: whether the file is one list, not one object a line."""
 
+    unit: ClassVar[str] = "line"
     name: str
     columns: tuple[str, ...]
     file: File

@@ -1,15 +1,16 @@
 """Readings of a table by a mapping, told or guessed."""
 
+from array import array
 from collections.abc import Mapping
 
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.readings import (
+    NS_PER_S,
     RANGE,
     ImportingError,
     LeftOut,
-    Ranges,
     Readings,
     Unit,
     headings_of,
@@ -33,8 +34,8 @@ from dropanchor_service.importing.tables.mapping import (
 from dropanchor_service.importing.tables.table import Table, number, text_of
 from dropanchor_service.importing.tables.times import Times, times_of
 from dropanchor_service.importing.tables.units import SI, conversion
+from dropanchor_tag_client.recording.recording import Rows
 
-_FAR_NS = 30 * 86_400 * 1_000_000_000
 _NEEDED = {RANGE, *(names[0] for names in VECTORS.values()), "heading"}
 
 
@@ -80,17 +81,16 @@ def readings_of(table: Table, fields: Fields) -> Readings:
     if not found.times:
         raise ImportingError(f"{table.name}: no row has a time in the column {fields[T].name!r}")
     times = _times(found, fields)
-    near = _near(times, found, table.name, readings.left_out)
     readings.notes += [
         f"{table.name}: {note}" for note in (*table.notes, *times.notes, *_conversions(table, fields, found))
     ]
     for quantity, kind in found.vectors.items():
-        rows, columns = _kept(kind, near)
-        stream = stream_of(times.t_ns[rows], np.column_stack(columns), table.name, quantity, readings.left_out)
-        setattr(readings, quantity, stream)
-    readings.ranges = _ranges(found.ranges, times.t_ns, near)
-    rows, columns = _kept(found.headings, near)
-    readings.headings = headings_of(times.t_ns[rows], *columns)
+        t_ns, columns, rows = _columns(kind, times, found, table)
+        setattr(readings, quantity, stream_of(t_ns, np.column_stack(columns), rows, quantity, readings.left_out))
+    t_ns, columns, rows = _columns(found.ranges, times, found, table)
+    readings.ranges = ranges_of(t_ns, found.ranges.anchors, columns, rows, readings.left_out)
+    t_ns, columns, rows = _columns(found.headings, times, found, table)
+    readings.headings = headings_of(t_ns, columns, rows, readings.left_out)
     readings.units = _units(fields)
     if left := unused(table.columns, dict(fields)):
         readings.notes.append(f"{table.name}: not used: {', '.join(left[:12])}{', …' if len(left) > 12 else ''}")
@@ -106,28 +106,18 @@ def _times(found: Collected, fields: Fields) -> Times:
         notes = [f"{column.name} is ISO 8601" + (" without a time zone: taken for UTC" if found.zoneless else "")]
         times = times_of(found.times, "ns", column.name, found.lines)
         times = times._replace(notes=notes + times.notes)
-    return times._replace(t_ns=times.t_ns + np.asarray(found.seconds, np.int64)) if found.seconds else times
+    return times._replace(t_ns=times.t_ns + np.clip(found.seconds, 0, NS_PER_S)) if found.seconds else times
 
 
-def _near(times: Times, found: Collected, source: str, left_out: LeftOut) -> Array:
-    """Return which rows have a time that is near most others: a device without a set clock sends 1970 at first."""
-    near: Array = np.abs(times.t_ns - np.int64(np.median(times.t_ns))) < _FAR_NS
-    for row in np.flatnonzero(~near).tolist():
-        left_out.add(source, "the time is more than 30 days from most others", found.lines[row])
-    return near
-
-
-def _ranges(kind: Kind, t_ns: Array, near: Array) -> Ranges:
-    rows, columns = _kept(kind, near)
-    anchors = [anchor for anchor, row in zip(kind.anchors, kind.rows, strict=True) if near[row]]
-    return ranges_of(t_ns[rows], anchors, *columns)
-
-
-def _kept(kind: Kind, near: Array) -> tuple[Array, list[Array]]:
-    """Return the rows of readings whose time is near most others, and their columns."""
+def _columns(kind: Kind, times: Times, found: Collected, table: Table) -> tuple[Array, list[Array], Rows]:
+    """Return the times and the columns of readings of one kind, and where they stand."""
     rows = np.asarray(kind.rows, np.int64)
-    kept = near[rows]
-    return rows[kept], [np.asarray(column)[kept] for column in kind.values.values()]
+    lines = array("q", np.asarray(found.lines)[rows].tolist())
+    return (
+        times.t_ns[rows],
+        [np.asarray(column) for column in kind.values.values()],
+        Rows(table.name, table.unit, lines),
+    )
 
 
 def _conversions(table: Table, fields: Fields, found: Collected) -> list[str]:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from dropanchor_service.importing.readings import LeftOut
 
@@ -16,8 +16,10 @@ _EMPTY = {"", "nan", "null", "none", "na", "n/a", "-", "--", "inf", "-inf", "+in
 
 
 class Table(Protocol):
-    """name: of its file or topic. columns: their names. notes: what was decided to read it. anchor_advice:
-    what to do where nothing names the anchor."""
+    """name: of its file or topic. unit: what a row of it is. columns: their names. notes: what was decided to read it.
+    anchor_advice: what to do where nothing names the anchor."""
+
+    unit: ClassVar[str]
 
     @property
     def name(self) -> str: ...
@@ -47,18 +49,18 @@ def number(value: Any) -> float | None:
     elif value is None or isinstance(value, bool):
         return None
     else:
-        found = float(value)
+        found = float(value) if not isinstance(value, int) or value.bit_length() < 1000 else math.inf
     return found if math.isfinite(found) else None
 
 
 def exact_number(value: Any) -> Exact | None:
     """Return a cell as a number with all its digits: a float has too few for UTC in ns. Raises ValueError."""
-    if isinstance(value, int) and not isinstance(value, bool):
-        return value
-    if isinstance(value, str) and value.strip().isdigit():
-        return int(value)
     found = number(value)
-    return Decimal(value.strip().replace(",", ".")) if isinstance(value, str) and found is not None else found
+    if found is None or isinstance(value, int):
+        return None if found is None else int(value)
+    if isinstance(value, str):
+        return int(value) if value.strip().isdigit() else Decimal(value.strip().replace(",", "."))
+    return found
 
 
 def text_of(value: Any) -> str:

@@ -7,12 +7,14 @@ from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE, getincrementaldecoder
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 from dropanchor_service.importing.files import File
 from dropanchor_service.importing.progress import shown
 from dropanchor_service.importing.readings import ImportingError, LeftOut
 from dropanchor_service.importing.tables.table import Row, number
 from dropanchor_service.importing.tables.times import iso_ns
+from dropanchor_tag_client.recording.bounded import lines_of
 
 _HEAD_BYTES = 65_536
 _HEAD_LINES = 60
@@ -26,6 +28,7 @@ class TextTable:
     """name: of the file. separator: of the columns; a space stands for any white space. first: its first line with
     values, counted from 1."""
 
+    unit: ClassVar[str] = "line"
     name: str
     columns: tuple[str, ...]
     notes: tuple[str, ...]
@@ -43,7 +46,7 @@ class TextTable:
         width = len(self.columns)
         with self.file.opened() as raw:
             lines = io.TextIOWrapper(raw, self.encoding, errors="replace", newline="")
-            for line, cells in _split(shown(lines, self.name), self.separator, self.name):
+            for line, cells in _split(shown(lines_of(lines, self.name), self.name), self.separator, self.name):
                 if line < self.first or not cells:
                     continue
                 while len(cells) > width and not cells[-1]:

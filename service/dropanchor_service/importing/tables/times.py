@@ -7,17 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.importing.readings import TIME
+from dropanchor_service.importing.readings import LATEST_NS, NS_PER_S, TIME
 from dropanchor_service.importing.tables.table import Exact
 from dropanchor_service.importing.tables.units import conversion
+from dropanchor_tag_client.recording.units import interval_of
 
-NS_PER_S = 1_000_000_000
 UTC_S = (1e9, 4.1e9)  # from 2001 to 2099: numbers within are taken for UTC
 _USUAL_HZ = 50.0
 _PLAUSIBLE_HZ = (0.2, 20_000.0)
 _UNITS = ("s", "ms", "us", "ns")
 _WRAP = 2**32
-BACK_S = 1.0
 
 
 class Times(NamedTuple):
@@ -28,16 +27,18 @@ class Times(NamedTuple):
 
 
 def times_of(raw: Sequence[Exact], unit: str | None, column: str, lines: list[int]) -> Times:
-    """Return the times of a column. unit: None if nobody told. lines: of the rows."""
+    """Return the times of a column. unit: None if nobody told; one that cannot be is not used. lines: of the rows."""
     notes = []
     numbers, wraps = _unwrapped(raw)
     if wraps:
         notes.append(f"{column}: the counter wraps at 2^32 (line {lines[wraps[0]]}): unwrapped {len(wraps)} times")
+    if unit is not None and np.median(np.abs(np.asarray(numbers, np.float64))) * _factor(unit) >= LATEST_NS:
+        notes.append(f"{column}: the values are after 2116 in {unit}")
+        unit = None
     if unit is None:
         unit = _unit_of(np.asarray(numbers, np.float64))
         notes.append(f"{column}: no unit is told; the values look like {_NAMES[unit]}: --map t={column}:{unit}")
-    t_ns = _ns(numbers, conversion(unit, TIME).factor)
-    return Times(t_ns, notes + _back(t_ns, column, lines))
+    return Times(np.array([bounded(number, _factor(unit)) for number in numbers], np.int64), notes)
 
 
 _NAMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
@@ -82,32 +83,22 @@ def _unit_of(numbers: Array) -> str:
         return "s"
     steps = np.diff(numbers)
     rising = steps[steps > 0]
-    step = float(rising.sum() / len(steps)) if len(rising) else 1.0
+    step = interval_of(numbers.tolist()) or (float(np.median(rising)) if len(rising) else 1.0)
     middle = float(np.median(numbers))
-    rates = {unit: NS_PER_S / (step * conversion(unit, TIME).factor) for unit in _UNITS}
+    rates = {unit: NS_PER_S / (step * _factor(unit)) for unit in _UNITS}
     for unit, rate in rates.items():
-        seconds = middle * conversion(unit, TIME).factor / NS_PER_S
+        seconds = middle * _factor(unit) / NS_PER_S
         if UTC_S[0] <= seconds < UTC_S[1] and (_PLAUSIBLE_HZ[0] <= rate <= _PLAUSIBLE_HZ[1] or len(numbers) < 3):
             return unit
     return min(_UNITS, key=lambda unit: abs(float(np.log(rates[unit] / _USUAL_HZ))))
 
 
-def _ns(numbers: Sequence[Exact], factor: float) -> Array:
-    """Return ns, exactly for numbers that are exact."""
-    if factor == int(factor) and not any(isinstance(number, float) for number in numbers):
-        return np.array([round(number * int(factor)) for number in numbers], np.int64)
-    ns: Array = np.rint(np.asarray(numbers, np.float64) * factor).astype(np.int64)
-    return ns
+def bounded(number: Exact, factor: float = 1.0) -> int:
+    """Return ns, exactly for a number that is exact; of nonsense the latest time that there is."""
+    is_exact = factor == int(factor) and not isinstance(number, float)
+    ns = number * int(factor) if is_exact else float(number) * factor
+    return round(min(max(ns, -LATEST_NS), LATEST_NS))
 
 
-def _back(t_ns: Array, column: str, lines: list[int]) -> list[str]:
-    steps_s = np.diff(t_ns) / NS_PER_S
-    back = np.flatnonzero(steps_s < -BACK_S)
-    if not len(back):
-        return []
-    first = int(back[0])
-    return [
-        f"{column}: time goes back by {-steps_s[first]:.1f} s in line {lines[first + 1]}"
-        f"{f' and {len(back) - 1} times more' if len(back) > 1 else ''}: the rows are put in order of time. If a clock "
-        "was set or a device started anew there, cut the file and import the parts one by one"
-    ]
+def _factor(unit: str) -> float:
+    return conversion(unit, TIME).factor
