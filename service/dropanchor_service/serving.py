@@ -70,6 +70,7 @@ class Serving:
                 partial(receive_health, site.id),
                 plans=folder.plans,
                 events=events,
+                refusal_of=site.refusal_of,
                 recorder=folder.recorder,
                 max_tags=site.quota.max_tags,
                 omlox=folder.omlox,

@@ -10,8 +10,6 @@ from dropanchor_service.ingest.decode import read_forms
 from dropanchor_service.store import ServedSite, Sites, Tag
 from dropanchor_service.store.pending_tags import BufferedMessage, is_confirmed
 
-_REFUSALS = {"refuse": Reason.TAG_UNKNOWN, "quarantine": Reason.TAG_QUARANTINED}
-
 
 class Admission:
     """Give rows to the tags that an operator has listed, and to other tags as the quota of their site says.
@@ -49,8 +47,8 @@ class Admission:
             return tag
         if name in site.store.tags:
             return site.tags.register(name)
-        if quota.unknown_tags in _REFUSALS:
-            return _REFUSALS[quota.unknown_tags]
+        if (refusal := site.refusal_of(name)) is not None:
+            return refusal
         if tag is not None:
             return site.tags.register(name)
         if len(site.tags) >= quota.max_tags:

@@ -8,6 +8,7 @@ from functools import partial
 from dropanchor_schemas import keys
 from dropanchor_schemas.keys import InvalidKeyError
 from dropanchor_schemas.site import Site
+from dropanchor_schemas.wire import Reason
 from dropanchor_service.settings.buckets import common_bucket
 from dropanchor_service.settings.quota import Quota
 from dropanchor_service.store.health import HealthTable
@@ -16,6 +17,7 @@ from dropanchor_service.store.rows import Rows, Tag
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
 
+_REFUSALS = {"refuse": Reason.TAG_UNKNOWN, "quarantine": Reason.TAG_QUARANTINED}
 LEAST_PENDING_BYTES = 2**16  # for the messages of pending tags of a site, however many sites there are
 
 
@@ -33,6 +35,13 @@ class ServedSite:
     @property
     def id(self) -> str:
         return self.store.site.id
+
+    def refusal_of(self, name: str) -> Reason | None:
+        """Return why the site refuses a tag that it does not list, None if it does not."""
+        tag = self.tags.find(name)
+        if name in self.store.tags or (tag is not None and not self.tags.is_deleted(tag.row)):
+            return None
+        return _REFUSALS.get(self.quota.unknown_tags)
 
 
 class Sites:

@@ -76,7 +76,7 @@ class Kind(Enum):
     SHAPE_REFUSED = (422, "The shape cannot be a zone")
     DESTINATION_REFUSED = (422, "The destination cannot be used")
     PLAN_IMAGE_REFUSED = (422, "The file cannot be a floor plan")
-    SAMPLES_REJECTED = (422, "The samples cannot be decoded")
+    SAMPLES_REJECTED = (422, "The samples are not used")
     HEALTH_REJECTED = (422, "The health of the tag cannot be decoded")
     TOO_MANY_REQUESTS = (429, "Too many requests")
     INTERNAL = (500, "An internal error occurred")

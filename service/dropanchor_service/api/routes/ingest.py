@@ -12,6 +12,7 @@ from starlette.responses import PlainTextResponse, Response
 from dropanchor_schemas.answers import PhoneReadingsReceived, SamplesReceived
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_schemas.kinds import KINDS, Frame
+from dropanchor_schemas.rejections import REASONS_EXPLAINED
 from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.site import ID_SCHEMA
 from dropanchor_schemas.times import why_not_utc
@@ -99,7 +100,8 @@ def _add_samples_route(router: APIRouter) -> None:
         summary="Send samples of a tag",
         description="One payload of the contract, chosen by Content-Type as over Zenoh by the encoding, of at most "
         "65,536 bytes. It is treated as if it had come over Zenoh: order, clocks, admission and counters are the same. "
-        "Times before 2015 that do not count from boot are refused: they are not UTC in ns.",
+        "Times before 2015 that do not count from boot are refused: they are not UTC in ns. So is a tag that the site "
+        "does not admit (`unknown_tags`).",
         status_code=202,
         response_model=SamplesReceived,
         responses=example_response({"samples": 1}, 202)
@@ -109,8 +111,7 @@ def _add_samples_route(router: APIRouter) -> None:
     async def ingest_samples(request: Request, query: Annotated[OfTag, Query()]) -> Response:
         tag, payload = tag_of(request, query), await request.body()
         encoding = encoding_of(request)
-        parts_of(request).receive(tag, payload, encoding)  # what cannot be decoded is counted there too
-        samples = count_samples(payload, encoding)
+        samples = take_samples(parts_of(request), tag, payload, encoding)
         if isinstance(samples, Rejection):
             raise ProblemError(Kind.SAMPLES_REJECTED, f"{samples.reason}: {samples.detail}.", reason=samples.reason)
         return json_response({"samples": samples}, status=202)
@@ -137,6 +138,8 @@ def _add_sensor_logger_route(router: APIRouter, phones_of: ForEachSite[PhoneInta
             posted = await run_in_threadpool(phones.post, tag, body, query.signs)
         except PhoneError as error:
             return PlainTextResponse(str(error), PHONE_ERROR)
+        if (refused := why_refused(parts_of(request), tag)) is not None:
+            return PlainTextResponse(refused.detail, PHONE_ERROR)
         if posted.waiting:
             loop = asyncio.get_running_loop()
             loop.call_later(WAIT_S, loop.run_in_executor, None, phones.release_overdue)
@@ -160,6 +163,19 @@ def tag_of(request: Request, query: OfTag) -> str:
     except InvalidKeyError as error:
         raise ProblemError(Kind.INVALID_REQUEST, f"query.tag: {error}") from error
     return tag
+
+
+def take_samples(site: SiteParts, tag: str, payload: bytes, encoding: str) -> int | Rejection:
+    """Take a payload in. Return how many samples it holds, or why none of them is used."""
+    site.receive(tag, payload, encoding)  # what is refused is counted there, too
+    found = count_samples(payload, encoding)
+    return found if isinstance(found, Rejection) else why_refused(site, tag) or found
+
+
+def why_refused(site: SiteParts, tag: str) -> Rejection | None:
+    """Return why the site refuses all samples of a tag, None if it does not."""
+    reason = site.refusal_of(tag)
+    return None if reason is None else Rejection(reason, REASONS_EXPLAINED[reason].cause)
 
 
 def count_samples(payload: bytes, encoding: str) -> int | Rejection:

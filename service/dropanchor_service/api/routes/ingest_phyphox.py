@@ -18,9 +18,9 @@ from dropanchor_service.api.http.behind_proxy import prefix_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.contents import TEXT
-from dropanchor_service.api.routes.ingest import OfApp, OfTag, tag_of
+from dropanchor_service.api.routes.ingest import OfApp, OfTag, tag_of, why_refused
 from dropanchor_service.api.routes.parameters import example_response, json_response
-from dropanchor_service.api.routes.site_of_request import ForEachSite
+from dropanchor_service.api.routes.site_of_request import ForEachSite, parts_of
 from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.phones.intake import PhoneIntake
 from dropanchor_service.phones.phyphox import Message, parse
@@ -113,6 +113,8 @@ def _add_readings_route(router: APIRouter, phones_of: ForEachSite[PhoneIntake[Me
             counted = decode_json(body)
             reason = {"reason": counted.reason} if isinstance(counted, Rejection) else {}
             raise ProblemError(Kind.SAMPLES_REJECTED, str(error), **reason) from error
+        if (refused := why_refused(parts_of(request), tag)) is not None:
+            raise ProblemError(Kind.SAMPLES_REJECTED, refused.detail, reason=refused.reason)
         if outcome.waiting:
             loop = asyncio.get_running_loop()
             loop.call_later(WAIT_S, loop.run_in_executor, None, phones.release_overdue)

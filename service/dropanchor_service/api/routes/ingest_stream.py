@@ -21,7 +21,7 @@ from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, i
 from dropanchor_service.api.http.closing import reason_of
 from dropanchor_service.api.http.connections import TooManyConnectionsError
 from dropanchor_service.api.http.errors import Kind, ProblemError
-from dropanchor_service.api.routes.ingest import count_samples
+from dropanchor_service.api.routes.ingest import take_samples
 from dropanchor_service.api.routes.shared_parts import shared_of
 from dropanchor_service.api.routes.site_of_request import parts_of, sites_of
 from dropanchor_service.api.routes.site_parts import SiteParts
@@ -60,9 +60,9 @@ class _Acknowledgements:
     def greeting(self) -> str:
         return self._json(0)
 
-    def of(self, payload: bytes, encoding: str) -> str:
+    def of(self, taken: int | Rejection) -> str:
         self._messages += 1
-        return self._json(count_samples(payload, encoding))
+        return self._json(taken)
 
     def _json(self, found: int | Rejection) -> str:
         self._refresh_state()
@@ -118,8 +118,8 @@ class _Stream:
             async for payload, encoding in _messages(self._socket):
                 await self._wait_for_turn(client)
                 self._require_open(identity)
-                site.receive(tag, payload, encoding)
-                await self._socket.send_text(acknowledgements.of(payload, encoding))
+                taken = take_samples(site, tag, payload, encoding)
+                await self._socket.send_text(acknowledgements.of(taken))
 
     async def _identity(self) -> Identity | None:
         if self._authenticator is None:

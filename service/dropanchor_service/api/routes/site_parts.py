@@ -1,7 +1,9 @@
 """What the routes of one site work on."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
+from dropanchor_schemas.wire import Reason
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.phones.intake import Receive
@@ -15,7 +17,7 @@ class SiteParts:
     """receive, receive_health: take samples and health that come over HTTP. recorder: None without a folder for files.
 
     plans: floor plans. events: zones, events and destinations. max_tags: how many tags the site admits. omlox: what
-    omlox clients have said; None for no omlox interface.
+    omlox clients have said; None for no omlox interface. refusal_of: returns why the site refuses all samples of a tag.
     """
 
     answers: Answers
@@ -26,6 +28,7 @@ class SiteParts:
     recorder: Recorder | None = None
     max_tags: int = 20_000
     omlox: OmloxItems | None = None
+    refusal_of: Callable[[str], Reason | None] = lambda _: None
 
     @property
     def id(self) -> str:

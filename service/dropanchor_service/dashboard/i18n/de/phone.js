@@ -33,7 +33,7 @@ export default {
   "phone.queue_full": "Die Warteschlange auf diesem Gerät ist voll: Die ältesten Messwerte wurden verworfen.",
   "phone.screen_off": "Der Bildschirm kann ausgehen, und dann stoppen die Sensoren: Lassen Sie ihn an.",
   "phone.bad_key": "Das ist kein Schlüssel: Er enthält Zeichen, die kein Schlüssel hat.",
-  "phone.not_understood": "Der Dienst hat eine Nachricht nicht verstanden: {detail}.",
+  "phone.not_understood": "Der Dienst nimmt eine Nachricht nicht an: {detail}.",
   "phone.https_motion": "Browser geben Bewegungsdaten nur an Seiten über HTTPS: Öffnen Sie diese Seite mit https://.",
   "phone.no_sensors": "Dieser Browser hat keine Bewegungssensoren.",
   "phone.motion_denied": "Bewegung wurde nicht erlaubt. Schließen Sie den Tab, öffnen Sie den Link erneut und erlauben Sie sie.",

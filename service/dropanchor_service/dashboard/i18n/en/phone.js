@@ -33,7 +33,7 @@ export default {
   "phone.queue_full": "The queue on this device is full: its oldest samples were dropped.",
   "phone.screen_off": "The screen may go off, and then the sensors stop: keep it on.",
   "phone.bad_key": "This is not a key: it has characters that no key has.",
-  "phone.not_understood": "The service did not understand a message: {detail}.",
+  "phone.not_understood": "The service does not take a message: {detail}.",
   "phone.https_motion": "Browsers give motion to pages over HTTPS only: open this page with https://.",
   "phone.no_sensors": "This browser has no motion sensors.",
   "phone.motion_denied": "Motion was not allowed. Close the tab, open the link again and allow it.",
