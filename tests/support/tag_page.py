@@ -126,7 +126,7 @@ class TagPage:
         counts: dict[str, int] = self.page.evaluate("dropanchor.counts()")
         return counts
 
-    def wait_for(self, condition: str, timeout_s: float = 40) -> None:
+    def wait_for(self, condition: str, timeout_s: float = PATIENCE_S) -> None:
         """Wait until a JavaScript expression is true; `counts` in it are the numbers of samples.
 
         The expression is evaluated from outside, since the content security policy forbids it inside the page.

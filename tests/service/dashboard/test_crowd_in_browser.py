@@ -69,6 +69,6 @@ def test_names_and_ellipses_of_a_crowd_have_room_and_tags_beside_the_map_are_cou
         while hints.count() > 0:
             hints.first.click()
             page.wait_for("dropanchor.drawing().still")
-            page.page.wait_for_timeout(300)  # until they are counted again
+            page.wait_for(f"{BESIDE} + {IN_VIEW} === {len(x) + 2}")
         assert page.page.evaluate(IN_VIEW) == len(x) + 2
         assert page.errors == []

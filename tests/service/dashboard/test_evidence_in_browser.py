@@ -98,7 +98,7 @@ def test_the_plots_show_every_measurement_where_it_belongs(chromium: Browser, pl
             assert np.corrcoef(x, seconds)[0, 1] > 0.9999
             assert np.corrcoef(y, values)[0, 1] < -0.999
             assert len(marks(page, plot, "refused")) == len(REFUSED)
-        assert page.page.locator("[data-text='innovation']").inner_text() == "97 % in the band, 2 of 60 refused"
+        expect(page.page.locator("[data-text='innovation']")).to_have_text("97 % in the band, 2 of 60 refused")
         assert page.page.locator("[data-plot='range'] path.expected").count() == 2
         assert page.errors == []
 
@@ -126,10 +126,8 @@ def test_the_map_shows_the_uncertainty_of_the_heading(chromium: Browser, place: 
         page.wait_for_map(1)
         empty = sector(page, 0.0), sector(page, 2.5 * HEADING_SIGMA)
         select(page)
-        end_s = time.monotonic() + 40
-        while sector(page, 0.0) == empty[0] and time.monotonic() < end_s:
+        while sector(page, 0.0) == empty[0]:
             page.page.wait_for_timeout(50)
-        assert sector(page, 0.0) != empty[0]
         assert sector(page, 2.5 * HEADING_SIGMA) == empty[1]
 
 
@@ -153,9 +151,9 @@ def test_the_page_says_how_much_ranges_scatter_where_the_engine_learns_it(chromi
         drive(place, "van", hard_gate=True)
         select(page)
         scatter = page.page.locator("[data-text='scatter']")
-        assert scatter.text_content() == "Its ranges scatter by 0.50 m, of which 0.40 m last for seconds"
+        expect(scatter).to_have_text("Its ranges scatter by 0.50 m, of which 0.40 m last for seconds")
         select(page, "van")
-        page.page.wait_for_function("() => document.querySelector('[data-text=scatter]').textContent === ''")
+        expect(scatter).to_have_text("")
 
 
 def test_a_tag_without_innovations_has_no_plots(chromium: Browser, place: Place) -> None:
@@ -179,10 +177,9 @@ def test_used_samples_are_counted_by_kind_and_rejected_ones_by_reason(chromium: 
     tags.rows.count_rejected(Reason.RANGE_ABSURD, np.full(1, row))
     with watched_page(chromium, place.url) as page:
         select(page)
-        used = page.page.locator("[data-part='samples'] li").all_inner_texts()
-        assert used == ["Used", "imu 12,040", "range 1,204"]
-        refused = page.page.locator("[data-part='rejected'] li").all_inner_texts()
-        assert refused == ["Not used", "late 3", "range absurd 1"]
+        used, refused = (page.page.locator(f"[data-part='{part}'] li") for part in ("samples", "rejected"))
+        expect(used).to_have_text(["Used", "imu 12,040", "range 1,204"])
+        expect(refused).to_have_text(["Not used", "late 3", "range absurd 1"])
 
 
 def test_the_panel_can_be_focused_and_scrolled_with_the_keyboard(chromium: Browser, place: Place) -> None:
@@ -202,7 +199,7 @@ def test_the_panel_names_what_the_ellipse_comes_from_and_what_would_shrink_it(ch
         select(page)
         box = page.page.locator("[data-part='uncertainty']")
         box.wait_for()
-        assert box.locator("p").inner_text() == (
+        expect(box.locator("p")).to_have_text(
             "± 0.5 m, of which 0.4 m come from where north is. Set where it starts and looks (`start`)."
         )
         names = [line.split("\n")[0] for line in box.locator("li").all_inner_texts()]

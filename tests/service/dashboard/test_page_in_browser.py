@@ -7,7 +7,7 @@ from threading import Event
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
@@ -123,11 +123,11 @@ def test_selection_works_with_the_keyboard_alone(chromium: Browser, place: Place
         page.page.locator("#table").focus()
         for key in ("ArrowDown", "ArrowDown", "ArrowDown", "Enter"):
             page.page.keyboard.press(key)
-        assert page.page.locator("#detail [data-part='name']").inner_text() == "a-10"
-        assert page.page.locator("tr[aria-selected='true']").get_attribute("data-tag") == "a-10"
-        assert page.page.locator("#spoken").inner_text().startswith("a-10 selected")
+        expect(page.page.locator("#detail [data-part='name']")).to_have_text("a-10")
+        expect(page.page.locator("tr[aria-selected='true']")).to_have_attribute("data-tag", "a-10")
+        expect(page.page.locator("#spoken")).to_contain_text("a-10 selected")
         page.page.keyboard.press("Escape")
-        assert page.page.locator("#detail").is_hidden()
+        expect(page.page.locator("#detail")).to_be_hidden()
 
 
 def test_a_click_on_a_dot_selects_it_and_a_click_beside_it_deselects_it(chromium: Browser, place: Place) -> None:
@@ -136,9 +136,9 @@ def test_a_click_on_a_dot_selects_it_and_a_click_beside_it_deselects_it(chromium
         page.wait_for_map(1)
         x, y = page.tags()["cart"]["pixel"]
         page.page.locator("#map").click(position={"x": x, "y": y})
-        assert page.page.locator("#detail [data-part='name']").inner_text() == "cart"
+        expect(page.page.locator("#detail [data-part='name']")).to_have_text("cart")
         page.page.locator("#map").click(position={"x": 40, "y": 300})
-        assert page.page.locator("#detail").is_hidden()
+        expect(page.page.locator("#detail")).to_be_hidden()
 
 
 def test_the_map_moves_by_mouse_and_keys_and_returns_with_show_all(chromium: Browser, place: Place) -> None:
@@ -204,7 +204,7 @@ def test_names_from_tags_are_text_never_markup(chromium: Browser, place: Place) 
         assert cell.inner_text().startswith("<img")
         assert cell.get_attribute("title") == name
         cell.click()
-        assert page.page.locator("#detail [data-part='name']").inner_text() == name
+        expect(page.page.locator("#detail [data-part='name']")).to_have_text(name)
         page.wait_for("document.querySelector('[data-part=\"v-turn\"]').textContent !== '–'")
         assert page.errors == []
 
