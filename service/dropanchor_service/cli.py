@@ -27,6 +27,8 @@ _COMMANDS = {
     "compile": "compile the estimator ahead of the first start",
     "key": "manage API keys of the REST interface",
     "history": "move the history of a site from its file into a database",
+    "backup": "copy data and credentials of a service, while it runs",
+    "restore": "put a backup back in place",
     "record": "record the samples and poses of a service, and download the files",
     "import": "turn bags of ROS, exports of phones and tables into a recording",
     "replay": "run an engine on a recording, offline",

@@ -12,7 +12,8 @@ import pytest
 from support.commands import python
 from support.service import ROOT
 
-UNITS = sorted((ROOT / "deploy" / "systemd").glob("*.service"))
+FOLDER = ROOT / "deploy" / "systemd"
+UNITS = sorted(FOLDER.glob("*.service"))
 INSTALLED = "/opt/dropanchor/bin/dropanchor"
 
 
@@ -28,10 +29,11 @@ def test_systemd_accepts_the_units(tmp_path: Path) -> None:
     program = tmp_path / "dropanchor"
     program.write_text("#!/bin/sh\n")
     program.chmod(0o755)
-    for path in UNITS:
+    written = [*UNITS, *FOLDER.glob("*.timer")]
+    for path in written:
         (tmp_path / path.name).write_text(path.read_text().replace(INSTALLED, str(program)))
     verified = subprocess.run(
-        ["systemd-analyze", "verify", *(str(tmp_path / path.name) for path in UNITS)],
+        ["systemd-analyze", "verify", *(str(tmp_path / path.name) for path in written)],
         capture_output=True,
         text=True,
         check=False,
@@ -39,7 +41,7 @@ def test_systemd_accepts_the_units(tmp_path: Path) -> None:
     )
     ours = [line for line in verified.stderr.splitlines() if str(tmp_path) in line or "dropanchor" in line]
     assert not ours
-    assert len(UNITS) == 2
+    assert len(written) == 4
 
 
 @pytest.mark.parametrize("path", UNITS, ids=lambda path: path.name)
@@ -47,6 +49,7 @@ def test_the_program_has_every_option_that_a_unit_passes(path: Path) -> None:
     program, command, *options = shlex.split(unit(path)["Service"]["ExecStart"])
     assert program == INSTALLED
     text = python("-m", "dropanchor_service", command, "--help").stdout
+    assert text
     assert not [option for option in options if option.startswith("--") and option not in text]
 
 
@@ -56,3 +59,17 @@ def test_the_service_gets_time_to_stop_and_is_always_restarted() -> None:
     assert service["Restart"] == "always"
     assert service["Type"] == "notify"
     assert "MemoryDenyWriteExecute" not in service
+
+
+def test_the_backup_finds_the_folders_that_the_service_is_given() -> None:
+    """The service has them as options, which its settings file does not know."""
+    service, backup = (
+        unit(FOLDER / "dropanchor.service")["Service"],
+        unit(FOLDER / "dropanchor-backup.service")["Service"],
+    )
+    words = shlex.split(service["ExecStart"])
+    given = {words[i].removeprefix("--"): words[i + 1] for i in range(2, len(words) - 1, 2)}
+    set_to = dict(word.split("=", 1) for word in backup["Environment"].split())
+    assert set_to == {"DROPANCHOR_DATA_DIR": given["data-dir"], "DROPANCHOR_SECURITY__FOLDER": given["security"]}
+    assert shlex.split(backup["ExecStart"])[2] == given["config"]
+    assert backup["ReadWritePaths"] == given["data-dir"]
