@@ -13,11 +13,19 @@ from typing import Any
 
 from dropanchor_service.commands.early import data_dir_of
 from dropanchor_service.runtime.kernel_cache import use_kernel_cache
-from dropanchor_tag_client.command_line import COMPLETION, Parser, add_completion_arguments, completion_script
+from dropanchor_tag_client.command_line import (
+    COMPLETION,
+    Parser,
+    add_completion_arguments,
+    completion_script,
+    explain_actions,
+)
 
 _COMMANDS = {
     "demo": "run the service with simulated tags and watch them in a browser",
     "serve": "run the service",
+    "check": "check the settings, credentials, folders and ports of a service without starting it",
+    "status": "show how a running service and its tags do",
     "router": "run a separate Zenoh router",
     "api": "run an API node of a cluster: the page and REST of all its sites",
     "cluster": "run sites on several machines: start, show, move, drain",
@@ -102,6 +110,7 @@ def _parser(chosen: Container[str], words: Sequence[str] = ()) -> Parser:
             command = _imported(name)
             one.description, one.epilog = command.DESCRIPTION, command.EPILOG
             command.add_arguments(one)
+            explain_actions(one)
             one.set_defaults(run=command.run)
     add_completion_arguments(commands.add_parser("completion", help=COMPLETION), "dropanchor")
     return parser

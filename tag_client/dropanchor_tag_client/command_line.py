@@ -54,6 +54,17 @@ def did_you_mean(word: str, names: Iterable[str]) -> str:
     return f"; did you mean {nearest[0]}?" if nearest else ""
 
 
+def explain_actions(command: argparse.ArgumentParser) -> None:
+    """Let the help of each action of a command describe it, with those examples of the command that call it."""
+    for actions in command._actions:
+        if isinstance(actions, argparse._SubParsersAction):
+            briefs = {choice.dest: choice.help or "" for choice in actions._choices_actions}
+            for name, action in actions.choices.items():
+                action.description = f"{briefs[name][:1].upper()}{briefs[name][1:]}."
+                lines = [line for line in (command.epilog or "").splitlines() if f"{action.prog} " in f"{line} "]
+                action.epilog = "\n".join(["examples:", *lines, ""])
+
+
 def add_completion_arguments(parser: argparse.ArgumentParser, program: str) -> None:
     parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help=" or ".join(SHELLS))
     parser.description = "Prints the script that completes the commands and options of this program in a shell."

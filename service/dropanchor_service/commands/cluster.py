@@ -24,6 +24,8 @@ EPILOG = """\
 examples:
   dropanchor cluster start --head --config yards.toml                 on the machine that looks after the others
   dropanchor cluster start --join --config yards.toml                 on each of the others
+  dropanchor cluster stop --config yards.toml                         on a machine that is to leave
+  dropanchor cluster supervise --ray 10.0.0.1:6379 --address 10.0.0.1 --token token --config yards.toml
   dropanchor cluster status --config yards.toml
   dropanchor cluster move 017 --to machine-2 --config yards.toml
   dropanchor cluster drain machine-1 --config yards.toml              before you service it

@@ -15,7 +15,9 @@ TIMEOUT_S = 30.0
 
 
 class RefusedError(Exception):
-    """The service rejected the request or did not answer. The message says why."""
+    """The service rejected the request or did not answer. The message says why. status: of HTTP; 0 without an answer"""
+
+    status = 0
 
 
 def add_rest_options(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +47,9 @@ def opened(arguments: argparse.Namespace, method: str, path: str, body: Any = No
         answer: HTTPResponse = urlopen(request, timeout=TIMEOUT_S, context=trusted)
     except HTTPError as error:
         with error:
-            raise RefusedError(_reason(error)) from error
+            refused = RefusedError(_reason(error))
+        refused.status = error.code
+        raise refused from error
     except (URLError, HTTPException, OSError, ValueError) as error:
         reason = getattr(error, "reason", error)
         raise RefusedError(f"{arguments.url} does not answer ({reason}): check --url and that it runs") from error

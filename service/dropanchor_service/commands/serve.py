@@ -29,6 +29,11 @@ examples:
   dropanchor serve --zenoh-connect tcp/10.0.0.5:7447 --config yard.toml
   DROPANCHOR_UNKNOWN_TAGS=refuse dropanchor serve --config yard.toml
 
+all settings, of which these options are some:
+  dropanchor settings --show        what is in force, and where it comes from
+  dropanchor check --config FILE    whether the service would start with them
+  What each means: reference/settings.html below /help of a running service, or service/docs/reference/settings.md
+
 a settings file:
   unknown_tags = "refuse"
   [[site.anchors]]

@@ -1,7 +1,8 @@
 """The two programs as a person meets them at the shell: version, help, misspelt words, completion."""
 
+import argparse
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -12,8 +13,6 @@ from dropanchor_tag_client import cli as tag_cli
 from support.commands import Ended, called, python
 
 PROGRAMS = {"dropanchor": "dropanchor_service", "dropanchor-tag": "dropanchor_tag_client"}
-COMMANDS: dict[str, Iterable[str]] = {"dropanchor": service_cli._COMMANDS, "dropanchor-tag": tag_cli._COMMANDS}
-EVERY_COMMAND = [(program, command) for program, commands in COMMANDS.items() for command in commands]
 MISSPELT = [
     ("dropanchor", ["serv"], "serve"),
     ("dropanchor", ["serve", "--prot", "8081"], "--port"),
@@ -28,9 +27,8 @@ MISSPELT = [
 
 @cache
 def answers(program: str) -> dict[tuple[str, ...], Ended]:
-    """Return what the program says to the misspelt words and to a question for help with each command."""
-    misspelt = [tuple(words) for one, words, _ in MISSPELT if one == program]
-    calls = [*misspelt, *((command, "--help") for command in COMMANDS[program])]
+    """Return what the program says to the misspelt words."""
+    calls = [tuple(words) for one, words, _ in MISSPELT if one == program]
     return dict(zip(calls, called(PROGRAMS[program], calls), strict=True))
 
 
@@ -61,12 +59,40 @@ def test_a_word_like_no_other_is_refused_with_all_choices() -> None:
     assert "did you mean" not in last
 
 
-@pytest.mark.parametrize(("program", "command"), EVERY_COMMAND)
-def test_the_help_of_every_command_has_an_example(program: str, command: str) -> None:
-    ended = answers(program)[command, "--help"]
-    assert ended.returncode == 0, ended.stderr
-    assert "examples:" in ended.stdout or "example:" in ended.stdout
-    assert f"{program} {command}" in ended.stdout.partition("example")[2]
+def below(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """Yield a parser and those of all its commands and their actions."""
+    yield parser
+    for actions in parser._actions:
+        if isinstance(actions, argparse._SubParsersAction):
+            for one in actions.choices.values():
+                yield from below(one)
+
+
+def is_explained(parser: argparse.ArgumentParser) -> bool:
+    """Return whether the help describes a command and has an example that calls it."""
+    text = parser.format_help()
+    examples = text.rpartition("\nexample")[2].splitlines()
+    described = " ".join((parser.description or "nothing").split()) in " ".join(text.split())
+    return described and any(f"{parser.prog} " in f"{line} " for line in examples)
+
+
+@pytest.mark.parametrize(
+    "parse",
+    [lambda: service_cli._parser(service_cli._COMMANDS), lambda: tag_cli.parser(*tag_cli._COMMANDS)],
+    ids=PROGRAMS,
+)
+def test_the_help_of_every_command_and_of_its_actions_describes_it_and_has_an_example(
+    parse: Callable[[], argparse.ArgumentParser],
+) -> None:
+    found = list(below(parse()))
+    assert len(found) > 8
+    assert [one.prog for one in found if not is_explained(one)] == []
+
+
+def test_the_help_of_serve_says_where_its_other_settings_are() -> None:
+    said = called("dropanchor_service", [["serve", "--help"]])[0].stdout
+    assert "dropanchor settings --show" in said
+    assert "service/docs/reference/settings.md" in said
 
 
 def test_a_tag_reports_nothing_below_its_log_level() -> None:

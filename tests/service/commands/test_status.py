@@ -1,0 +1,53 @@
+"""`dropanchor status` shows what a running service answers, and its exit code says whether all is well."""
+
+import json
+import subprocess
+from pathlib import Path
+
+from dropanchor_schemas.wire import ENCODING_JSON
+from support.commands import Ended
+from support.service import command, environment, running_service
+from support.yard import running_yard
+from support.zenoh_router import free_endpoint, free_port, wait_until
+
+ZONE = {"id": "dock", "shape": {"type": "circle", "x": 10.0, "y": 0.0, "radius_m": 500.0}}
+
+
+def status(url: str, *options: str, **variables: str) -> Ended:
+    words = command("status", "--url", url, *options)
+    done = subprocess.run(words, env=environment(**variables), capture_output=True, text=True, timeout=60, check=False)
+    return Ended(done.returncode, done.stdout, done.stderr)
+
+
+def test_tags_zones_events_and_what_is_refused_are_shown(tmp_path: Path) -> None:
+    with running_yard(tmp_path, "forklift-7") as yard:
+        yard.put("/api/v1/zones/dock", ZONE)
+        junk = b'{"range": [{"t_ns": 1, "anchor": 7, "range_m": -1.0}]}'
+        yard.ask("POST", "/api/v1/ingest/samples?tag=forklift-7", content=junk, headers={"content-type": ENCODING_JSON})
+        wait_until(lambda: yard.get("/api/v1/tags/forklift-7")["rejected"])
+        shown = status(yard.url)
+        assert (shown.returncode, shown.stderr) == (0, "")
+        lines = shown.stdout.splitlines()
+        assert lines[:2] == [
+            f"{yard.url}: ready",
+            next(line for line in lines if line.startswith("site default: 1 tags")),
+        ]
+        assert any(line.startswith("  tag forklift-7: ") and "refused" in line for line in lines)
+        assert "  zone dock: 0 tags" in lines  # the tag is silent
+        asked = json.loads(status(yard.url, "--json").stdout)
+        assert (asked["healthy"], asked["sites"][0]["tags"][0]["tag"]) == (True, "forklift-7")
+        unknown = status(yard.url, "--site", "elsewhere")
+        assert (unknown.returncode, "has no site elsewhere" in unknown.stderr) == (2, True)
+
+
+def test_a_service_that_is_impaired_or_starts_or_is_away_is_not_healthy(tmp_path: Path) -> None:
+    (tmp_path / "zones.json").write_text("cut")
+    with running_service("--data-dir", str(tmp_path)) as service:
+        impaired = status(service.url)
+        assert impaired.returncode == 1
+        assert "  impaired: zones.json is damaged" in impaired.stdout
+    with running_service("--zenoh-connect", free_endpoint(), ready=False) as service:
+        waiting = status(service.url)
+        assert (waiting.returncode, waiting.stdout.splitlines()[0]) == (1, f"{service.url}: not ready")
+    away = status(f"http://127.0.0.1:{free_port()}")
+    assert (away.returncode, "does not answer" in away.stderr) == (2, True)
