@@ -9,12 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from dropanchor_tag_client import TagClient
+from support.guides import ADDRESS, run
 from support.patience import PATIENCE_S
 from support.recordings import write_square
+from support.samples import samples
 from support.service import ROOT, Running, environment, running_service
 from support.zenoh_router import free_port, wait_until
 
 README = (ROOT / "README.md").read_text()
+SERVE = ".venv/bin/dropanchor"
 TAG_README = (ROOT / "tag_client" / "README.md").read_text()
 
 
@@ -39,11 +42,8 @@ def tags(service: Running) -> dict[str, dict[str, Any]]:
 def test_every_documented_way_to_start_a_tag_uses_the_same_anchor(tmp_path: Path) -> None:
     with running_service() as service:
         for text in (README, TAG_README):
-            subprocess.run(
-                [sys.executable, "-c", snippet(text, service.zenoh)], check=True, timeout=PATIENCE_S, env=environment()
-            )
-        (line,) = re.findall(r"^(echo .*)\.venv/bin/dropanchor-tag publish (.*)$", README, re.MULTILINE)
-        shell(f"{line[0]}{sys.executable} -m dropanchor_tag_client publish {line[1]} --connect {service.zenoh}")
+            program = snippet(text, service.zenoh)
+            subprocess.run([sys.executable, "-c", program], check=True, timeout=PATIENCE_S, env=environment())
         command = service.get("/api/v1/connect")["simulate"]
         assert command.startswith("/")
         assert service.zenoh in command
@@ -55,18 +55,42 @@ def test_every_documented_way_to_start_a_tag_uses_the_same_anchor(tmp_path: Path
         assert [anchor["id"] for anchor in service.get("/api/v1/site")["anchors"]] == ["1"]
 
 
-def test_the_tag_of_the_readme_is_told_what_a_position_needs_and_is_never_lost() -> None:
-    with running_service() as service:
-        program = snippet(README, service.zenoh)
-        subprocess.run([sys.executable, "-c", program], check=True, timeout=PATIENCE_S, env=environment())
-        wait_until(lambda: "hint" in service.ask("GET", "/api/v1/tags/forklift-7/pose").json())
-        pose = service.get("/api/v1/tags/forklift-7/pose")
-        needs = "A position needs about 20 s of ranges and of motion samples: 1 and 1 have arrived."
-        assert (pose["state"], pose["hint"]) == ("initialising", needs)
-        with TagClient("long-ago", connect=service.zenoh) as tag:
-            a_minute_ago_ns = time.time_ns() - 60 * 10**9
-            tag.publish_range(1, 12.34, t_ns=a_minute_ago_ns)
-            tag.publish_imu((0.0, 0.0, 9.81), (0.0, 0.0, 0.1), t_ns=a_minute_ago_ns)
+def test_the_lines_of_the_readme_do_what_it_says(tmp_path: Path) -> None:
+    """They are run in its order; only the addresses of the service are others."""
+    (tmp_path / ".venv").symlink_to(sys.prefix)
+    (program,) = (one for one in samples("python") if one.page == "README.md")
+    scripts = [one for one in samples("sh") if one.page == "README.md"]
+    starting = [one for one in scripts if re.search("make |dropanchor serve", one.text)]  # they run until stopped
+    assert [one.text.splitlines()[0].split()[0] for one in starting] == ["make", SERVE, SERVE]
+    lines = [line for one in scripts if one not in starting for line in one.text.splitlines()]
+    with running_service("--data-dir", str(tmp_path / "FOLDER")) as service:
+        (tmp_path / "tag.py").write_text(program.text.replace("tcp/127.0.0.1:7447", service.zenoh))
+        send = ".venv/bin/python tag.py"
+        assert send in README
+        run(send, tmp_path)
+        elsewhere = {ADDRESS: service.url, " publish ": f" publish --connect {service.zenoh} "}
+        elsewhere |= {f" record {action}": f" record {action} --url {service.url}" for action in ("start", "stop")}
+        said = ""
+        for line in lines:
+            if "curl" in line:  # a person takes longer to type it
+                wait_until(lambda: service.ask("GET", "/api/v1/tags/forklift-7/track").json().get("poses"))
+            for usual, other in elsewhere.items():
+                line = line.replace(usual, other)
+            said += run(line, tmp_path)
+            if "record start" in line:
+                run(send, tmp_path)
+    assert '"state":"initialising"' in said
+    assert "A position needs about 20 s of ranges and of motion samples" in said
+    assert re.search(r"t_ns,t_utc,.*\n\d+,", said)
+    assert "forklift-7: 1 poses" in said
+
+
+def test_a_tag_whose_samples_are_a_minute_old_is_initialising_and_not_lost() -> None:
+    with running_service() as service, TagClient("long-ago", connect=service.zenoh) as tag:
+        a_minute_ago_ns = time.time_ns() - 60 * 10**9
+        tag.publish_range(1, 12.34, t_ns=a_minute_ago_ns)
+        tag.publish_imu((0.0, 0.0, 9.81), (0.0, 0.0, 0.1), t_ns=a_minute_ago_ns)
+        tag.flush()
         wait_until(lambda: "hint" in service.ask("GET", "/api/v1/tags/long-ago/pose").json())
         pose = service.get("/api/v1/tags/long-ago/pose")
         assert (pose["state"], pose["age_s"] > 59) == ("initialising", True)

@@ -26,6 +26,7 @@ CURL = """curl() {
 """An error of the service ends a script. A stream has no end: that of its time is none."""
 
 BY_OTHERS = {
+    "README.md": "tests/e2e/test_first_ten_minutes.py",
     "back-up.md": "tests/e2e/test_backup.py",
     "generate-a-client.md": "tests/e2e/test_generated_clients.py",
     "read-exports.md": "tests/e2e/test_read_exports.py",

@@ -1,4 +1,4 @@
-"""The samples of code in the tutorial and the how-to guides, and the commands in them."""
+"""The samples of code in the README, the tutorial and the how-to guides, and the commands in them."""
 
 import re
 import shlex
@@ -33,7 +33,7 @@ def samples(*languages: str) -> list[Sample]:
     """Return the blocks in these languages, in the order of the pages."""
     return [
         Sample(file.name, block["language"], dedent(block["text"]))
-        for file in (_DOCS / "tutorial.md", *sorted((_DOCS / "how-to").glob("*.md")))
+        for file in (ROOT / "README.md", _DOCS / "tutorial.md", *sorted((_DOCS / "how-to").glob("*.md")))
         for block in _BLOCK.finditer(file.read_text("utf-8"))
         if block["language"] in languages
     ]
