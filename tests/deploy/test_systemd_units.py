@@ -5,12 +5,14 @@ import shlex
 import shutil
 import subprocess
 from configparser import ConfigParser
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from support.commands import python
-from support.service import ROOT
+from support.patience import PATIENCE_S
+from support.service import ROOT, command, environment
 
 FOLDER = ROOT / "deploy" / "systemd"
 UNITS = sorted(FOLDER.glob("*.service"))
@@ -61,15 +63,24 @@ def test_the_service_gets_time_to_stop_and_is_always_restarted() -> None:
     assert "MemoryDenyWriteExecute" not in service
 
 
-def test_the_backup_finds_the_folders_that_the_service_is_given() -> None:
+def test_the_backup_has_the_folders_that_the_service_is_given(tmp_path: Path) -> None:
     """The service has them as options, which its settings file does not know."""
-    service, backup = (
-        unit(FOLDER / "dropanchor.service")["Service"],
-        unit(FOLDER / "dropanchor-backup.service")["Service"],
-    )
+    service, backup = (unit(FOLDER / f"{name}.service")["Service"] for name in ("dropanchor", "dropanchor-backup"))
     words = shlex.split(service["ExecStart"])
-    given = {words[i].removeprefix("--"): words[i + 1] for i in range(2, len(words) - 1, 2)}
-    set_to = dict(word.split("=", 1) for word in backup["Environment"].split())
-    assert set_to == {"DROPANCHOR_DATA_DIR": given["data-dir"], "DROPANCHOR_SECURITY__FOLDER": given["security"]}
-    assert shlex.split(backup["ExecStart"])[2] == given["config"]
-    assert backup["ReadWritePaths"] == given["data-dir"]
+    given = {option: value for option, value in pairwise(words) if option.startswith("--")}
+    for place in (given["--data-dir"], given["--security"]):
+        (tmp_path / place[1:]).mkdir(parents=True)
+        (tmp_path / place[1:] / "site.json").write_text("{}")
+    (tmp_path / given["--config"][1:]).touch()
+
+    def inside(text: str) -> str:
+        places = text.replace("${STATE_DIRECTORY}", "/var/backups")
+        return places.replace("/etc", f"{tmp_path}/etc").replace("/var", f"{tmp_path}/var")
+
+    _, *options = shlex.split(inside(backup["ExecStart"]))
+    variables = dict(word.split("=", 1) for word in inside(backup["Environment"]).split())
+    subprocess.run(command(*options), env=environment(**variables), check=True, timeout=PATIENCE_S)
+    (made,) = (tmp_path / "var" / "backups").iterdir()
+    assert {path.name for path in made.iterdir()} == {"data", "security", "settings.toml", "SHA256SUMS"}
+    assert (made / "data" / "site.json").exists()
+    assert backup["ReadWritePaths"] == given["--data-dir"]
