@@ -84,3 +84,11 @@ def test_the_backup_has_the_folders_that_the_service_is_given(tmp_path: Path) ->
     assert {path.name for path in made.iterdir()} == {"data", "security", "settings.toml", "SHA256SUMS"}
     assert (made / "data" / "site.json").exists()
     assert backup["ReadWritePaths"] == given["--data-dir"]
+
+
+@pytest.mark.parametrize("name", ["dropanchor", "dropanchor-router"])
+def test_no_process_that_others_reach_sees_the_key_of_the_authority(name: str) -> None:
+    service = unit(FOLDER / f"{name}.service")["Service"]
+    words = shlex.split(service["ExecStart"])
+    folder = words[words.index("--security") + 1]
+    assert service["InaccessiblePaths"] == f"-{folder}/ca.key"

@@ -17,7 +17,7 @@ from dropanchor_service.security.issued import Table
 DESCRIPTION = """\
 Creates a folder with the credentials of a site: a certificate authority (ca), certificates for router, service and
 reader, and a router configuration that allows each tag to publish only its own samples. It never overwrites a file.
-Keep the folder private. Only adding tags needs ca.key, so you can store it elsewhere in between.
+Keep the folder private. Only new certificates need ca.key: store it elsewhere in between.
 """
 EPILOG = """\
 examples:
