@@ -48,6 +48,8 @@ class Serving:
         self._metrics = metrics
         self.folders = SiteFolders(settings, sites, now_ns, metrics, recovery)
         self.zone_events = ZoneEvents(settings, sites, latest, now_ns, metrics, recovery)
+        for site, folder, events in zip(sites, self.folders.all, self.zone_events.parts, strict=True):
+            events.note_changes(site.store, folder.plans, folder.omlox)
 
     def problems(self) -> Sequence[str]:
         """Return what does not work although the service can do its main work."""

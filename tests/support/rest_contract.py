@@ -30,6 +30,8 @@ BEYOND_THE_SCHEMA = {
     "get_heat_map": [positive_data_acceptance],
     "get_history_coverage": [positive_data_acceptance],
     "list_events": [positive_data_acceptance],
+    "list_changes": [positive_data_acceptance],
+    "get_changes_file": [positive_data_acceptance],
     "get_tracks": [positive_data_acceptance],
     "export_track": [positive_data_acceptance],
     "patch_remote_settings": [positive_data_acceptance],

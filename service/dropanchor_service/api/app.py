@@ -85,11 +85,12 @@ def create_app(
         receive,
         receive_health,
         plans or PlanStore(None),
-        events or EventParts.in_memory(answers.site.site.id),
+        events or EventParts.in_memory(answers.site.site.id, lambda: answers.now_ns()),
         recorder,
         max_tags,
         omlox,
     )
+    parts.events.note_changes(answers.site, parts.plans, omlox)
     border = Border(origins=cors_origins)
     shared = SharedParts(stopping, endpoints, credentials, authenticator, rate_limiter, border, basemap)
     return create_app_of([parts], shared, ready=ready, impaired=impaired, registry=registry, dashboard=dashboard)

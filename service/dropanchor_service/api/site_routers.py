@@ -4,6 +4,7 @@ from fastapi import APIRouter
 
 from dropanchor_service.api.routes.access import access_router
 from dropanchor_service.api.routes.api_keys import api_keys_router
+from dropanchor_service.api.routes.audit import audit_router
 from dropanchor_service.api.routes.basemap import basemap_router
 from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.coverage import coverage_router
@@ -53,6 +54,7 @@ def site_routers() -> tuple[APIRouter, ...]:
         tag_router(),
         site_router(),
         settings_router(),
+        audit_router(),
         north_router(),
         remote_settings_router(),
         track_router(),

@@ -1,4 +1,4 @@
-"""The SQLite file of the events, the states behind them, and the queues of destinations.
+"""The SQLite file of the events, the states behind them, the queues of destinations, and the trail of changes.
 
 One connection serves all threads, under a lock: every statement takes well under a millisecond, except the writing of a
 storm of events.
@@ -18,7 +18,7 @@ from dropanchor_service.runtime.recovery import Recovery, damaged
 from dropanchor_service.runtime.written_by import later_schema
 
 FILE_NAME = "events.sqlite"
-VERSION = 5
+VERSION = 6
 BUSY_S = 5.0
 CHECK_S = 1.0  # at a start: a large file is checked in part
 INSTEAD = say("new_events", "new events start, and what waited for its destinations is lost")
@@ -35,6 +35,13 @@ CREATE TABLE starts (
     tag TEXT PRIMARY KEY, place TEXT NOT NULL, before TEXT NOT NULL, first INTEGER NOT NULL, since_ns INTEGER NOT NULL,
     inside TEXT NOT NULL
 ) WITHOUT ROWID;
+"""
+_CHANGES = """
+CREATE TABLE changes (
+    number INTEGER PRIMARY KEY AUTOINCREMENT, t_ns INTEGER NOT NULL, source TEXT NOT NULL, name TEXT NOT NULL,
+    kind TEXT NOT NULL, item TEXT NOT NULL, before TEXT, after TEXT, confirmed INTEGER NOT NULL DEFAULT 0
+);
+CREATE INDEX changes_by_time ON changes (t_ns);
 """
 _STAYS_OF_EVENTS = """
 INSERT INTO stays SELECT tag, zone, entered_ns, since_ns FROM (
@@ -63,6 +70,7 @@ CREATE TABLE deliveries (
 {_DEAD_LETTERS}
 {_STAYS}
 {_STARTS}
+{_CHANGES}
 PRAGMA user_version = {VERSION};
 """
 
@@ -189,6 +197,9 @@ class Database:
             version = 4
         if version == 4:
             connection.executescript(f"BEGIN; {_STARTS} PRAGMA user_version = 5; COMMIT;")
+            version = 5
+        if version == 5:
+            connection.executescript(f"BEGIN; {_CHANGES} PRAGMA user_version = 6; COMMIT;")
             version = VERSION
         if self._path is not None and version > VERSION:
             raise EventFileError(later_schema(self._path, version, VERSION, self._path))

@@ -14,10 +14,11 @@ from dropanchor_service.events.database import Database
 from dropanchor_service.events.drafts import Draft, Happening, StartBegan, StateKey, States, StateValue, Stay
 from dropanchor_service.events.starts import add_start, close_start, starts_of
 from dropanchor_service.events.stays import add_stays, prune_stays
+from dropanchor_service.events.trail import prune_changes
 
 PRUNED = 5_000  # events per transaction
 
-_NEWEST = "SELECT coalesce(max(seq), 0) FROM sqlite_sequence"
+_NEWEST = "SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'events'"
 
 _UNKNOWN = {
     name: field.default for name, field in EventData.model_fields.items() if not field.is_required()
@@ -178,11 +179,12 @@ class EventStore:
         values = [] if oversized else [keep_from_ns]
         with self.database.transaction() as connection:
             prune_stays(connection, None if oversized else keep_from_ns, PRUNED)
-            end = connection.execute(
-                f"SELECT max(sequence) FROM (SELECT sequence, t_ns FROM events ORDER BY sequence LIMIT {PRUNED}) "
-                f"WHERE {condition}",
+            end, end_ns = connection.execute(
+                "SELECT max(sequence), max(t_ns) FROM "
+                f"(SELECT sequence, t_ns FROM events ORDER BY sequence LIMIT {PRUNED}) WHERE {condition}",
                 values,
-            ).fetchone()[0]
+            ).fetchone()
+            prune_changes(connection, end_ns if oversized else keep_from_ns)
             if end is None:
                 return 0
             self.dropped_deliveries += connection.execute(

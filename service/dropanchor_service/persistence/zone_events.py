@@ -18,6 +18,7 @@ from dropanchor_service.events.deliveries import Deliveries
 from dropanchor_service.events.site_watch import WatchedSite
 from dropanchor_service.events.store import EventStore
 from dropanchor_service.events.thread import EventThread, Retention
+from dropanchor_service.events.trail import ChangeTrail
 from dropanchor_service.events.watcher import Watcher
 from dropanchor_service.metrics.events import EventMetrics
 from dropanchor_service.metrics.registry import Metrics
@@ -58,6 +59,7 @@ class ZoneEvents:
         self._recovery = recovery or Recovery()
         self._closing = ExitStack()
         self._sites = sites
+        self._now_ns = now_ns
         shared = _shared_ways(settings)
         opened = [self._open(settings, site, shared, several=len(sites) > 1) for site in sites]
         outboxes = [one.outbox for one in opened]
@@ -78,7 +80,8 @@ class ZoneEvents:
         outbox = of_site.outbox
         problem_of = partial(self._delivery.problem_of, index)
         return EventParts(
-            of_site.items, outbox.store, outbox.destinations, outbox.deliveries, outbox.channels, problem_of
+            *(of_site.items, outbox.store, outbox.destinations, outbox.deliveries, outbox.channels, problem_of),
+            ChangeTrail(outbox.store.database, self._now_ns),
         )
 
     def _open(self, settings: Settings, site: ServedSite, shared: SharedWays, several: bool) -> _Opened:

@@ -10,6 +10,7 @@ from dropanchor_service.plans.reading.messages import ReadPlan
 from dropanchor_service.runtime.recovery import Recovery, was_damaged
 from dropanchor_service.store.items import NamedItems, adapter_of
 from dropanchor_service.store.preconditions import Precondition, always
+from dropanchor_service.store.trail import Change
 
 MAX_PLANS = 64
 MAX_UNUSED = 8
@@ -49,8 +50,9 @@ class PlanStore(NamedItems[Plan]):
     def add_image(self, read: ReadPlan) -> PlanImage:
         """Store an image that a plan can then use. Raises OSError."""
         made = read.description
-        with self._images_lock:
+        with self._images_lock, self.trail.changing(Change("plan-image", "", None, None)) as change:
             image = self._folder.write(read.content, made.media_type, made.width_px, made.height_px)
+            change.item, change.after = image.id, image
             self._images.pop(image.id, None)  # the newest is the last
             self._images[image.id] = image
             self._drop_unused()

@@ -1,6 +1,7 @@
 """Named items that are edited over REST, such as zones: kept in memory and saved in a file."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import Any, Generic, TypeVar
@@ -11,6 +12,7 @@ from dropanchor_service.runtime.atomic_file import UP_TO_UMASK
 from dropanchor_service.runtime.recovery import Recovery, write_with_copy
 from dropanchor_service.store.preconditions import Precondition, always, require
 from dropanchor_service.store.shared import Save
+from dropanchor_service.store.trail import NO_TRAIL, Change, Trail
 
 Item = TypeVar("Item", bound=BaseModel)
 
@@ -47,7 +49,14 @@ class NamedItems(Generic[Item]):
         if path is not None:
             self._items = (recovery or Recovery()).read(path, adapter.validate_json, mode) or {}
         self._told: list[Callable[[], None]] = []
+        self._noted: Callable[[str, Item | None, Item | None], Change] = partial(Change, "item")
+        self.trail: Trail = NO_TRAIL
         self.version = 1
+
+    def note_changes(self, trail: Trail, kind: str, shown: Callable[[Item], BaseModel] = lambda item: item) -> None:
+        """Note each change in a trail. shown: returns what of an item may be read there."""
+        self.trail = trail
+        self._noted = partial(Change, kind, shown=shown)
 
     def on_change(self, told: Callable[[], None]) -> None:
         """Call this after every change, on the thread that makes it."""
@@ -59,7 +68,7 @@ class NamedItems(Generic[Item]):
         if saved is not None:
             self._apply(self._adapter.validate_json(saved))
         elif self._items:
-            self._replace(self._items)
+            self._save_all(self._items)
 
     @property
     def all(self) -> Mapping[str, Item]:
@@ -72,10 +81,11 @@ class NamedItems(Generic[Item]):
         Raises FullError, OSError, and ChangedMeanwhileError when `allows` refuses; then nothing has changed.
         """
         with self._lock:
-            require(allows, self._items.get(name))
+            before = self._items.get(name)
+            require(allows, before)
             if name not in self._items and len(self._items) >= self._limit:
                 raise FullError
-            self._replace(self._items | {name: item})
+            self._replace(self._items | {name: item}, self._noted(name, before, item))
 
     def remove(self, name: str, allows: Precondition = always) -> None:
         """Remove an item and save.
@@ -84,14 +94,20 @@ class NamedItems(Generic[Item]):
         changed.
         """
         with self._lock:
-            require(allows, self._items[name])
-            self._replace({key: item for key, item in self._items.items() if key != name})
+            before = self._items[name]
+            require(allows, before)
+            left = {key: item for key, item in self._items.items() if key != name}
+            self._replace(left, self._noted(name, before, None))
 
-    def _replace(self, items: dict[str, Item]) -> None:
-        """Save first, then apply: a restart never loses an acknowledged change."""
+    def _replace(self, items: dict[str, Item], change: Change) -> None:
+        """Note and save first, then apply: a restart never loses an acknowledged change."""
+        with self.trail.changing(change):
+            self._save_all(items)
+        self._apply(items)
+
+    def _save_all(self, items: dict[str, Item]) -> None:
         if self._save is not None:
             self._save(self._adapter.dump_json(items, indent=2))
-        self._apply(items)
 
     def _apply(self, items: dict[str, Item]) -> None:
         self._items = items

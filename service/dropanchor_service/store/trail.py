@@ -1,10 +1,10 @@
 """Who changes what: each store tells its trail of a change before it saves it."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from pydantic import BaseModel
 
@@ -22,17 +22,23 @@ WHO: ContextVar[Who] = ContextVar("who")
 SERVICE = Who("service")
 
 
+def _whole(value: BaseModel) -> BaseModel:
+    return value
+
+
 @dataclass
 class Change:
     """kind: such as `anchor`. item: its id. before, after: None where there was or will be none.
 
-    What is not known before the change is made, such as a new id, may be corrected until its context ends.
+    shown: returns what of them may be read again. What is not known before the change is made, such as a new id, may be
+    corrected until its context ends.
     """
 
     kind: str
     item: str
     before: BaseModel | None
     after: BaseModel | None
+    shown: Callable[[Any], BaseModel] = _whole
 
     @property
     def is_none(self) -> bool:

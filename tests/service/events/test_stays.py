@@ -104,6 +104,7 @@ def test_the_events_of_an_older_file_become_stays(tmp_path: Path) -> None:
     with bench.database.transaction() as connection:
         connection.execute("DROP TABLE stays")
         connection.execute("DROP TABLE starts")
+        connection.execute("DROP TABLE changes")
         connection.execute("DROP INDEX dead_letters")
         connection.execute("ALTER TABLE deliveries DROP COLUMN again_ns")
         connection.execute("PRAGMA user_version = 2")

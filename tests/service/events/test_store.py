@@ -7,7 +7,7 @@ import pytest
 
 from dropanchor_schemas.events import EventType
 from dropanchor_schemas.zones import BatteryLowRule, TooCloseRule
-from dropanchor_service.events.database import FILE_NAME, Database, EventFileError
+from dropanchor_service.events.database import FILE_NAME, VERSION, Database, EventFileError
 from dropanchor_service.events.deliveries import Deliveries
 from dropanchor_service.events.drafts import Draft
 from dropanchor_service.events.store import EventStore, Selection
@@ -111,7 +111,7 @@ def test_a_damaged_file_is_moved_aside_and_another_version_is_refused(tmp_path: 
     with sqlite3.connect(tmp_path / FILE_NAME) as connection:
         connection.execute("PRAGMA user_version = 99")
     connection.close()
-    with pytest.raises(EventFileError, match="schema 99, and this version knows 5"):
+    with pytest.raises(EventFileError, match=f"schema 99, and this version knows {VERSION}"):
         Database(tmp_path)
 
 
@@ -122,6 +122,7 @@ def test_the_queues_of_an_older_file_go_on(tmp_path: Path) -> None:
         connection.execute("ALTER TABLE deliveries RENAME destination TO webhook")
         connection.execute("DROP TABLE stays")
         connection.execute("DROP TABLE starts")
+        connection.execute("DROP TABLE changes")
         connection.execute("DROP INDEX dead_letters")
         connection.execute("ALTER TABLE deliveries DROP COLUMN again_ns")
         connection.execute("PRAGMA user_version = 1")
@@ -129,7 +130,7 @@ def test_the_queues_of_an_older_file_go_on(tmp_path: Path) -> None:
     database = Database(tmp_path)
     assert Deliveries(database).states()["hook"].pending == 1
     assert Deliveries(database).next_chance("hook") is None
-    assert database.rows("PRAGMA user_version") == [(5,)]
+    assert database.rows("PRAGMA user_version") == [(VERSION,)]
     database.close()
 
 

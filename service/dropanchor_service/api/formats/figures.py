@@ -21,7 +21,7 @@ def figures_csv(figures: dict[str, Any]) -> bytes:
     for tag in figures["tags"]:
         inside = {time["zone"]: time["inside_s"] for time in tag["zones"]}
         numbers = [_number(tag[name]) for name in FIGURES]
-        writer.writerow([_plain(tag["tag"]), *period, *numbers, *(inside.get(zone, 0) for zone in zones)])
+        writer.writerow([plain(tag["tag"]), *period, *numbers, *(inside.get(zone, 0) for zone in zones)])
     return text.getvalue().encode()
 
 
@@ -30,6 +30,6 @@ def _number(value: float | None) -> float | str:
     return "" if value is None or not math.isfinite(value) else value
 
 
-def _plain(text: str) -> str:
+def plain(text: str) -> str:
     """Return a text that no spreadsheet takes for a formula."""
     return f"'{text}" if text.startswith(_FORMULA) else text

@@ -17,10 +17,12 @@ from dropanchor_service.api.http.shared_view import Members, narrowed
 from dropanchor_service.api.http.site_in_path import divided
 from dropanchor_service.security import share_links
 from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
+from dropanchor_service.store.trail import WHO, Who
 
 KEY_IN_URL = (f"{INGEST}sensor-logger", f"{INGEST}phyphox")
 """Paths for apps of phones that cannot set headers."""
 LOOPBACK = "loopback"
+LOCAL = Who("local")
 _LIMITED = say("link_limited", "This share link shows its tags and nothing else.")
 _HOW_TO_AUTHENTICATE = say(
     "how_to_authenticate",
@@ -57,6 +59,7 @@ class Access:
             return
         request = Request(scope)
         identity, refusal = await self._authenticate(request)
+        WHO.set(LOCAL if identity is None else Who(identity.source, identity.name))
         refusal = self._rate_limited(request, identity) or refusal or self._forbidden(request, identity)
         if refusal is not None:
             await refusal(scope, receive, send)

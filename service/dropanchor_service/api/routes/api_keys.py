@@ -17,9 +17,10 @@ from dropanchor_schemas.sentences import said_by, say
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
 from dropanchor_service.api.routes.shared_parts import shared_of
-from dropanchor_service.api.routes.site_of_request import parts_of, sites_of
+from dropanchor_service.api.routes.site_of_request import parts_of, sites_of, trail_of
 from dropanchor_service.security.api_keys import ApiKey, ApiKeyError, ApiKeys, api_keys_of
 from dropanchor_service.security.identity import Scope
+from dropanchor_service.store.trail import Change
 
 _EXAMPLE: dict[str, Any] = {
     "id": "3f9a1c5e",
@@ -82,9 +83,11 @@ def _add_create_route(router: APIRouter) -> None:
                 Kind.EXISTS_ALREADY,
                 say("key_taken", "There is a key named {name} already: choose another name.", name=repr(body.name)),
             )
-        secret = _made(keys, body, site)
-        identifier = secret.split("_")[1]
-        return json_response(_shown(identifier, keys.all()[identifier]).model_dump() | {"secret": secret}, status=201)
+        with _changing(keys), trail_of(request).changing(Change("key", body.name, None, body)) as change:
+            secret = _made(keys, body, site)
+            identifier = secret.split("_")[1]
+            change.after = shown = _shown(identifier, keys.all()[identifier])
+        return json_response(shown.model_dump() | {"secret": secret}, status=201)
 
 
 def _add_revoke_route(router: APIRouter) -> None:
@@ -102,19 +105,19 @@ def _add_revoke_route(router: APIRouter) -> None:
         unknown = ProblemError(
             Kind.UNKNOWN_KEY, say("no_such_key", "There is no such key. GET /api/v1/keys lists them.")
         )
-        if keys is None or key not in _keys_of(request, keys):
+        known = _keys_of(request, keys).get(key)
+        if keys is None or known is None:
             raise unknown
-        with _changing(keys):
+        with _changing(keys), trail_of(request).changing(Change("key", known.name, _shown(key, known), None)):
             if not keys.revoke_id(key):
                 raise unknown
 
 
 def _made(keys: ApiKeys, body: KeyRequest, site: str) -> str:
-    """Make a key and return its secret. Raises ProblemError."""
-    with _changing(keys):
-        if body.tag is not None:
-            return keys.add_for_tag(body.name, body.tag, body.days, site)
-        return keys.add(body.name, Scope.named(body.scope or "read"), body.days, site)
+    """Make a key and return its secret. Raises ApiKeyError."""
+    if body.tag is not None:
+        return keys.add_for_tag(body.name, body.tag, body.days, site)
+    return keys.add(body.name, Scope.named(body.scope or "read"), body.days, site)
 
 
 @contextmanager

@@ -13,8 +13,9 @@ from dropanchor_service.api.http.behind_proxy import prefix_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
 from dropanchor_service.api.routes.shared_parts import shared_of
-from dropanchor_service.api.routes.site_of_request import parts_of, sites_of
+from dropanchor_service.api.routes.site_of_request import parts_of, sites_of, trail_of
 from dropanchor_service.security.share_links import MAX_LINKS, ShareLinks, TooManyLinksError, share_links_of
+from dropanchor_service.store.trail import Change
 
 _EXAMPLE: dict[str, Any] = {
     "id": "3f9a1c5e7b20d846",
@@ -73,8 +74,9 @@ def _add_create_route(router: APIRouter) -> None:
         if links is None:
             raise _no_access_control()
         try:
-            with saving():
+            with saving(), trail_of(request).changing(Change("share", "", None, None)) as change:
                 share, secret = links.add(site, body)
+                change.item, change.after = share.id, share
         except TooManyLinksError as error:
             raise ProblemError(
                 Kind.ITEMS_FULL, say("shares_full", "There are {n} share links: revoke some.", n=MAX_LINKS)
@@ -114,9 +116,10 @@ def _add_revoke_route(router: APIRouter) -> None:
         share: Annotated[str, Path(description="The id of the link.", examples=[_EXAMPLE["id"]])], request: Request
     ) -> None:
         site, links = parts_of(request).id, _links_of(request)
-        with saving():
-            is_known = links is not None and links.revoke(site, share)
-        if not is_known:
-            raise ProblemError(
-                Kind.UNKNOWN_SHARE, say("share_unknown", "There is no such share link. GET /api/v1/shares lists them.")
-            )
+        known = None if links is None else next((one for one in links.of_site(site) if one.id == share), None)
+        with saving(), trail_of(request).changing(Change("share", share, known, None)):
+            if links is None or not links.revoke(site, share):
+                raise ProblemError(
+                    Kind.UNKNOWN_SHARE,
+                    say("share_unknown", "There is no such share link. GET /api/v1/shares lists them."),
+                )

@@ -16,6 +16,7 @@ from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.routes.parameters import id_of
 from dropanchor_service.api.routes.site_parts import SiteParts
+from dropanchor_service.store.trail import Trail
 
 SITE_PREFIX = "/sites/{site}"
 T = TypeVar("T")
@@ -102,6 +103,11 @@ def parts_of(connection: HTTPConnection) -> SiteParts:
 def answers_of(connection: HTTPConnection) -> Answers:
     """Raises ProblemError; see `SitesOfApp.parts`."""
     return parts_of(connection).answers
+
+
+def trail_of(connection: HTTPConnection) -> Trail:
+    """Return the trail of the site of a request, in which its routes note their changes. Raises ProblemError."""
+    return parts_of(connection).events.trail
 
 
 class ForEachSite(Generic[T]):

@@ -38,7 +38,7 @@ data of the site.
 Links read of a tag's status neither health nor remote settings, and of its settings only `name`, `colour` and `group`,
 those of the whole site also `height_m`. No answer holds a secret, for administrators neither: a key or a share link is
 shown once, when it is made, the secret of a webhook never, and its URL up to the host. The experiment of phyphox holds
-the key that asked for it.
+the key that asked for it. In the trail of changes (`/audit`), entries of keys and share links are for `admin` alone.
 
 """
 

@@ -57,7 +57,16 @@ def test_events_are_asked_for_from_an_iso_time_on(since: str) -> None:
 
 TIME_PARAMETERS = [
     f"{path}?{name}="
-    for path in ("tags/a/track", "tags/a/track/file", "tracks", "heat-map", "figures", "history/coverage")
+    for path in (
+        "tags/a/track",
+        "tags/a/track/file",
+        "tracks",
+        "heat-map",
+        "figures",
+        "history/coverage",
+        "audit",
+        "audit/file",
+    )
     for name in ("from", "to")
 ] + ["tags/a/pose?at=", "events?since="]
 
