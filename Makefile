@@ -30,7 +30,7 @@ help:
 	@echo 'make demo     start the service and simulated tags around one anchor, print the page address'
 	@echo 'make test     install what the tests need and run them all'
 	@echo 'make test FAST=1   the short ones that need no browser, no other process and no database'
-	@echo 'make check    format, lint, types, import rules, generated files, breaking changes, age of the results'
+	@echo 'make check    format, lint, types, import rules, generated files, breaking changes, edited results'
 	@echo 'make docs     the documentation as a site of static files, in build/docs; the service has it below /help'
 	@echo 'make bench    measure what the service costs, print it and write it into $(RESULTS)/performance.md'
 	@echo 'make test-cluster  upgrade a cluster, let each of its parts die, and write the silences into $(RESULTS)/cluster.md'

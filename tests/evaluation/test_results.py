@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.report import SOURCES, page_of
 from dropanchor_evaluation import results
-from dropanchor_evaluation.results import Measured, NoPlaceError, main, problems, require_place, write
+from dropanchor_evaluation.results import Measured, NoPlaceError, main, older, problems, require_place, write
 
 PAGE = "# Results\n\n<!-- results speed -->\n<!-- end speed -->\n\nWhat it means.\n"
 CODE = '"""Doc."""\n\n\ndef twice(x):\n    """Double."""\n    return 2 * x  # why\n'
@@ -69,9 +69,10 @@ def test_a_manual_edit_is_detected(root: Path) -> None:
 def test_a_code_change_makes_a_table_outdated_and_a_comment_change_does_not(root: Path) -> None:
     measure(root)
     (root / "code.py").write_text(CODE.replace("Double.", "Return the double.").replace("# why", "# because"))
-    assert found(root) == []
+    assert older(root, root / "page.md") == []
     (root / "code.py").write_text(CODE.replace("2 * x", "3 * x"))
-    assert found(root) == ["page.md, speed: code.py changed since; measure it again"]
+    assert older(root, root / "page.md") == ["speed"]
+    assert found(root) == []
 
 
 def test_the_code_of_the_page_counts_and_so_does_its_removal(root: Path) -> None:
@@ -79,11 +80,11 @@ def test_the_code_of_the_page_counts_and_so_does_its_removal(root: Path) -> None
     script = root / "map" / "draw.js"
     script.write_text("draw();\n")
     write(root, root / "page.md", "speed", "| 1 |", Measured(["map"]))
-    assert found(root) == []
+    assert older(root, root / "page.md") == []
     script.write_text("drawTwice();\n")
-    assert found(root) == ["page.md, speed: map changed since; measure it again"]
+    assert older(root, root / "page.md") == ["speed"]
     script.unlink()
-    assert found(root) == ["page.md, speed: map changed since; measure it again"]
+    assert older(root, root / "page.md") == ["speed"]
 
 
 def test_the_command_checks_and_does_nothing_else(capsys: pytest.CaptureFixture[str]) -> None:
@@ -91,14 +92,15 @@ def test_the_command_checks_and_does_nothing_else(capsys: pytest.CaptureFixture[
     assert "--check" in capsys.readouterr().err
 
 
-def test_the_command_says_where_to_find_how_to_measure_an_outdated_table(
+def test_the_command_says_where_to_find_how_to_measure_an_edited_table(
     root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(results, "ROOT", root)
     monkeypatch.setattr(results, "PAGES", root)
     measure(root)
     assert main(["--check"]) == 0
-    (root / "code.py").write_text(CODE.replace("2 * x", "3 * x"))
+    page = root / "page.md"
+    page.write_text(page.read_text().replace("| 1 |", "| 0 |"))
     assert main(["--check"]) == 1
     assert "results/README.md names the command" in capsys.readouterr().err
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dropanchor_evaluation.results import ROOT, Measured, problems, write
+from dropanchor_evaluation.results import ROOT, Measured, older, problems, write
 
 PAGE = ROOT / "service" / "docs" / "pictures" / "README.md"
 SOURCES = ["service/dropanchor_service/dashboard"]
@@ -25,4 +25,4 @@ def pictures(page: Path) -> list[Path]:
 
 def is_outdated(page: Path) -> bool:
     """Return whether the page of Dropanchor has changed since its pictures were made. Raises OSError."""
-    return any(problems(ROOT, [page]))
+    return any(problems(ROOT, [page])) or bool(older(ROOT, page))

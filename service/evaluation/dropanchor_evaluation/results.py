@@ -1,8 +1,9 @@
-"""Tables of measured figures in the documentation. A command writes them, and a check detects outdated ones.
+"""Tables of measured figures in the documentation. A command writes them, and a check detects those that people edit.
 
 A table stands between two markers in a Markdown file. Its last line says when, where and at which commit it was
 measured. The first marker holds two digests. That of the table shows an edit by hand. That of the sources which the
-table measures shows that the table is older than they are. Comments, docstrings and formatting do not count.
+table measures shows that the table is older than they are: the page of results lists such tables. Comments, docstrings
+and formatting do not count.
 
 The line `<!-- place for NAME -->` is where a table goes that nobody has measured yet.
 
@@ -19,6 +20,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 
 _BLOCK = re.compile(
@@ -70,17 +72,29 @@ def write(root: Path, page: Path, name: str, text: str, measured: Measured) -> N
 
 
 def problems(root: Path, pages: Sequence[Path]) -> Iterator[str]:
-    """Yield a message for each table that was never measured, was edited by hand, or is older than its sources."""
+    """Yield a message for each table that was never measured, or was edited by hand."""
     for page in pages:
-        for block in _BLOCK.finditer(page.read_text(encoding="utf-8")):
-            facts = dict(_FACT.findall(block["facts"]))
-            place = f"{page.relative_to(root)}, {block['name']}"
+        for name, facts, text in _blocks(page):
+            place = f"{page.relative_to(root)}, {name}"
             if "table" not in facts:
                 yield f"{place}: nothing has been measured yet"
-            elif facts["table"] != _digest(block["text"]):
+            elif facts["table"] != _digest(text):
                 yield f"{place}: the table was edited by hand; measure it again"
-            elif facts["sources"] != sources_digest(root, facts["measures"].split()):
-                yield f"{place}: {facts['measures']} changed since; measure it again"
+
+
+def older(root: Path, page: Path) -> Sequence[str]:
+    """Return the names of the tables of a page whose sources have changed since they were measured."""
+    return [
+        name
+        for name, facts, _ in _blocks(page)
+        if "table" in facts and facts["sources"] != sources_digest(root, facts["measures"].split())
+    ]
+
+
+def _blocks(page: Path) -> Iterator[tuple[str, dict[str, str], str]]:
+    """Yield the name, the facts and the text of each table."""
+    for block in _BLOCK.finditer(page.read_text(encoding="utf-8")):
+        yield block["name"], dict(_FACT.findall(block["facts"])), block["text"]
 
 
 def sources_digest(root: Path, sources: Sequence[str]) -> str:
@@ -97,7 +111,12 @@ def sources_digest(root: Path, sources: Sequence[str]) -> str:
 
 def _code(file: Path) -> str:
     text = file.read_text(encoding="utf-8")
-    return ast.dump(_without_docstrings(ast.parse(text))) if file.suffix == ".py" else text
+    return _of_python(text) if file.suffix == ".py" else text
+
+
+@cache  # many tables measure the same files
+def _of_python(text: str) -> str:
+    return ast.dump(_without_docstrings(ast.parse(text)))
 
 
 def _without_docstrings(tree: ast.Module) -> ast.Module:
@@ -148,7 +167,7 @@ def _processor() -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Return 1 and print a sentence for each table that is not current, 2 for other arguments than --check."""
+    """Return 1 and print a sentence for each table with a problem, 2 for other arguments than --check."""
     if arguments != ["--check"]:
         sys.stderr.write("usage: python -m dropanchor_evaluation.results --check\n")
         return 2

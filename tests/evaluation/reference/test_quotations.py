@@ -14,8 +14,8 @@ ROW = "| forklift/9-axis/nothing/known |"
 @pytest.fixture
 def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with copies of the results, which the quotations are taken from."""
-    for page in ("scenarios.md", "performance.md", "cluster.md", "tags.md"):
-        (tmp_path / page).write_text((PAGES / page).read_text())
+    for page in PAGES.glob("*.md"):
+        (tmp_path / page.name).write_text(page.read_text())
     monkeypatch.setattr(quotations, "PAGES", tmp_path)
     return tmp_path
 

@@ -11,7 +11,7 @@ from typing import Final
 
 from dropanchor_evaluation.reference.goals_page import rows_of
 from dropanchor_evaluation.reference.markdown import table
-from dropanchor_evaluation.results import PAGES
+from dropanchor_evaluation.results import PAGES, ROOT, older
 
 _BLOCK: Final = re.compile(r"(<!-- quoted (?P<name>\w+) -->\n).*?(<!-- end (?P=name) -->\n)", re.DOTALL)
 
@@ -264,4 +264,13 @@ def _cost_of(sources: Sequence[str] | None) -> str:
     return "; ".join(parts)
 
 
-_TABLES: Final[dict[str, Callable[[], str]]] = {"movers": _movers, "costs": _costs, "tags": _tags}
+def _older() -> str:
+    lines = [f"- [{page.name}]({page.name}): {', '.join(names)}\n" for page in _pages() if (names := older(ROOT, page))]
+    return "".join(lines) or "None.\n"
+
+
+def _pages() -> Sequence[Path]:
+    return sorted(PAGES.glob("*.md"))
+
+
+_TABLES: Final[dict[str, Callable[[], str]]] = {"movers": _movers, "costs": _costs, "tags": _tags, "older": _older}
