@@ -6,7 +6,6 @@ run the old code. So the folder of the cache is named after a digest of the sour
 
 import fcntl
 import functools
-import hashlib
 import os
 import subprocess
 import sys
@@ -30,17 +29,11 @@ algorithm1(np.arange(2.0), np.zeros(2), np.ones(2), (1.0, 0.0, 0.0), TUNED)
 
 def use_cache_of_these_sources() -> None:
     """Set NUMBA_CACHE_DIR for this process and its children, unless it is set already."""
-    from dropanchor_service.runtime.kernel_cache import use_processor_family
+    from dropanchor_service.runtime.kernel_cache import check_files, sources_digest, use_processor_family
 
     use_processor_family()
-    package = ROOT / "service" / "dropanchor_service"
-    sources = [
-        source
-        for name in ("estimation", "ingest/kernels", "answers/kernels", "zones")
-        for source in sorted((package / name).rglob("*.py"))
-    ]
-    digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources))
-    os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / digest.hexdigest()[:16]))
+    check_files()
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / sources_digest()))
     from dropanchor_service.estimation.fleet.compiled import Inner
 
     Inner.called_from_python = True

@@ -1,11 +1,14 @@
 """`dropanchor compile`: compile the estimator ahead of the first start, for example when an image is built."""
 
 import argparse
+import os
+import sys
 
 from dropanchor_service.commands.options import add_log_option
 from dropanchor_service.engines.compile_all import compile_all
 from dropanchor_service.engines.compile_apart import mark_complete
 from dropanchor_service.runtime import logs
+from dropanchor_service.runtime.kernel_cache import VARIABLE
 
 DESCRIPTION = """\
 Compiles the estimator and caches the result, so that the first start of `dropanchor serve` is as fast as any other.
@@ -27,5 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     logs.configure(arguments.log_level)
     compile_all()
-    mark_complete()
-    return 0
+    if mark_complete():
+        return 0
+    print(f"there is no room for the compiled estimator in {os.environ[VARIABLE]}", file=sys.stderr)
+    return 1

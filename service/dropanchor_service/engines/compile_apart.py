@@ -8,7 +8,9 @@ import sys
 from pathlib import Path
 
 from dropanchor_service.engines.warm_up import ESTIMATOR, PROGRESS_S, CompilationProgress, how_often, where_kept
-from dropanchor_service.runtime.kernel_cache import VARIABLE, mark_of
+from dropanchor_service.runtime.kernel_cache import VARIABLE, has_room, is_full, mark_of
+
+_OF_ONE = 4 << 20  # bytes: more than any kernel has
 
 _log = logging.getLogger(__name__)
 
@@ -18,7 +20,10 @@ def compile_apart(progress: CompilationProgress) -> None:
 
     When this fails, the caller compiles what is missing: more memory, but no harm. An exception ends the process, too.
     """
-    if (mark := _mark()) is None or mark.exists() or not _is_writable(mark.parent):
+    if (mark := _mark()) is None or is_full(mark.parent):
+        return
+    if not has_room(mark.parent):
+        _log.warning("%s has no room for the compiled estimator: what it lacks is compiled into memory", mark.parent)
         return
     shown = f"; {progress.page} shows the progress" if progress.page else ""
     progress.begin(ESTIMATOR)
@@ -52,18 +57,12 @@ def _run(progress: CompilationProgress) -> None:
                 os.killpg(made.pid, signal.SIGTERM)  # and the process that it has started
 
 
-def mark_complete() -> None:
-    """Note in the cache that all kernels are compiled for this processor."""
-    if (mark := _mark()) is not None:
-        mark.touch()
-
-
-def _is_writable(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
+def mark_complete() -> bool:
+    """Note in the cache that all kernels are compiled for this processor. Return whether it has room for them."""
+    if (mark := _mark()) is None or not has_room(mark.parent, _OF_ONE):
         return False
-    return os.access(folder, os.W_OK)
+    mark.touch()
+    return True
 
 
 def _mark() -> Path | None:

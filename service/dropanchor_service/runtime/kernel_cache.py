@@ -1,4 +1,4 @@
-"""Choose the folder in which numba caches compiled kernels.
+"""Choose the folder in which numba caches compiled kernels: `kernel_files` says what is taken from it.
 
 numba checks only the source file of the outermost kernel. After an update of another file that the kernel calls into,
 it would run the old code. Therefore the folder's name contains a digest of all sources.
@@ -11,7 +11,6 @@ import logging
 import os
 import platform
 import shutil
-import stat
 import tempfile
 import time
 from collections.abc import Callable
@@ -19,11 +18,14 @@ from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
+from dropanchor_service.runtime.kernel_files import DIRECTORY_MODE, FORMAT, damaged_in, is_private
 from dropanchor_service.runtime.shipped_kernels import CPU, FEATURES, copy_shipped, family, made_for, shipped
 
-VARIABLE = "NUMBA_CACHE_DIR"
+VARIABLE, LOCATOR = "NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES"
+ROOM = 16 << 20  # bytes, for all kernels
 KERNEL_SOURCES = ("estimation", "ingest/kernels", "answers/kernels", "zones")
 TEMPORARY = "dropanchor-kernels-"
+_NOWHERE = Path(os.devnull, f"{TEMPORARY}nowhere")  # a place where nothing is found or kept
 _LOCK = "lock"
 _YOUNG_S = 60.0  # so long a folder without a lock may be one that another process just makes
 
@@ -31,8 +33,8 @@ _log = logging.getLogger(__name__)
 
 
 def sources_digest() -> str:
-    """Return a digest of all sources that define kernels."""
-    return hashlib.sha256(b"".join(source.read_bytes() for source in _sources())).hexdigest()[:16]
+    """Return a digest of all sources that define kernels, and of the format of their files."""
+    return hashlib.sha256(b"".join([FORMAT, *(source.read_bytes() for source in _sources())])).hexdigest()[:16]
 
 
 def mark_of(folder: Path, what: str = "complete") -> Path:
@@ -62,12 +64,24 @@ def use_kernel_cache(data_dir: Callable[[], Path | None] = lambda: None) -> None
     data_dir: returns the data folder of the service. It has the cache where there is no home.
     """
     use_processor_family()
-    if VARIABLE in os.environ:
+    check_files()
+    if (given := os.environ.get(VARIABLE)) and _is_usable(Path(given).resolve()):
         return
     name = f"kernels-{sources_digest()}"
     folder = _in_home(name) or _in_data(data_dir(), name) or _temporary()
     os.environ[VARIABLE] = str(folder)
     _take_shipped(folder)
+    if folder.name.startswith(TEMPORARY) and not mark_of(folder).exists():
+        _log.warning(
+            "no folder keeps the compiled estimator, so it is compiled at every start: set a data folder (--data-dir), "
+            "or %s to a writable folder",
+            VARIABLE,
+        )
+
+
+def check_files() -> None:
+    """Let numba check the files that it loads."""
+    os.environ[LOCATOR] = "dropanchor_service.runtime.numba_cache.Place"
 
 
 def use_processor_family() -> None:
@@ -75,6 +89,29 @@ def use_processor_family() -> None:
     if CPU not in os.environ and (found := family()) is not None:
         os.environ[CPU] = found
         os.environ[FEATURES] = ""  # what the family has, and nothing else of this processor
+
+
+def is_full(folder: Path) -> bool:
+    """Return whether a cache has all kernels, after deleting what is damaged and copying what is shipped."""
+    mark = mark_of(folder)
+    if mark.exists() and (damaged := damaged_in(folder)):
+        _log.warning("%d files of the compiled estimator in %s are damaged, and are made anew", len(damaged), folder)
+        with suppress(OSError):  # what stays is not used either
+            for file in (mark, *damaged):
+                file.unlink(missing_ok=True)
+        _take_shipped(folder)
+    return mark.exists()
+
+
+def has_room(folder: Path, size: int = ROOM) -> bool:
+    """Make the folder if there is none. Return whether so many bytes can be written into it."""
+    try:
+        folder.mkdir(DIRECTORY_MODE, parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as probe:
+            os.posix_fallocate(probe.fileno(), 0, size)
+    except OSError:
+        return False
+    return True
 
 
 def _take_shipped(folder: Path) -> None:
@@ -90,7 +127,8 @@ def _take_shipped(folder: Path) -> None:
 
 def is_kept() -> bool:
     """Return whether the next start finds what is compiled now."""
-    return not Path(os.environ.get(VARIABLE, "")).name.startswith(TEMPORARY)
+    folder = Path(os.environ.get(VARIABLE, _NOWHERE))
+    return not folder.name.startswith(TEMPORARY) and has_room(folder)
 
 
 def _in_home(name: str) -> Path | None:
@@ -99,11 +137,11 @@ def _in_home(name: str) -> Path | None:
     except RuntimeError:  # the user has none
         return None
     folder = home / "dropanchor" / name
-    return folder if _is_made(folder) else None
+    return folder if _is_usable(folder) else None
 
 
 def _in_data(data_dir: Path | None, name: str) -> Path | None:
-    if data_dir is None or not _is_made(data_dir / name) or not _is_private(data_dir / name):
+    if data_dir is None or not _is_usable(data_dir / name):
         return None
     for old in data_dir.glob("kernels-*"):  # of the version before an update
         if old.name != name:
@@ -111,32 +149,30 @@ def _in_data(data_dir: Path | None, name: str) -> Path | None:
     return data_dir / name
 
 
-def _is_made(folder: Path) -> bool:
-    """Make the folder if there is none. Return whether it can be written."""
+def _is_usable(folder: Path) -> bool:
+    """Make the folder if there is none. Return whether it has the kernels or may be filled, and nobody else can write.
+
+    The code in a cache is executed.
+    """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(DIRECTORY_MODE, parents=True, exist_ok=True)
+        if is_private(folder):
+            return os.access(folder, os.W_OK, effective_ids=True) or mark_of(folder).exists()
     except OSError:
         return False
-    return os.access(folder, os.W_OK)
-
-
-def _is_private(folder: Path) -> bool:
-    """Return whether nobody else can write into the folder: the code in a cache is executed."""
-    found = folder.lstat()
-    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & 0o022
+    _log.warning("%s is not used: it is not yours, or others can write into it, and its code would be executed", folder)
+    return False
 
 
 def _temporary() -> Path:
     """Return a fresh private folder that goes with this process. A lock tells others that the process lives."""
-    _remove_left_over()
-    folder = Path(tempfile.mkdtemp(prefix=TEMPORARY))
-    fcntl.flock(os.open(folder / _LOCK, os.O_CREAT | os.O_RDWR, 0o600), fcntl.LOCK_EX)  # until the process ends
+    try:
+        _remove_left_over()
+        folder = Path(tempfile.mkdtemp(prefix=TEMPORARY))
+        fcntl.flock(os.open(folder / _LOCK, os.O_CREAT | os.O_RDWR, 0o600), fcntl.LOCK_EX)  # until the process ends
+    except OSError:  # a full disk
+        return _NOWHERE
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    _log.warning(
-        "no folder keeps the compiled estimator, so it is compiled at every start: set a data folder (--data-dir), or "
-        "%s to a writable folder",
-        VARIABLE,
-    )
     return folder
 
 
@@ -144,7 +180,7 @@ def _remove_left_over() -> None:
     """Delete the temporary folders of this user whose process was killed."""
     for folder in Path(tempfile.gettempdir()).glob(f"{TEMPORARY}*"):
         with suppress(OSError):
-            if _is_private(folder) and time.time() - folder.stat().st_mtime > _YOUNG_S and _has_no_process(folder):
+            if is_private(folder) and time.time() - folder.stat().st_mtime > _YOUNG_S and _has_no_process(folder):
                 shutil.rmtree(folder, ignore_errors=True)
 
 

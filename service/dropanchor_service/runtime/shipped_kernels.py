@@ -15,6 +15,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
+from dropanchor_service.runtime.kernel_files import DIRECTORY_MODE, NOT_OF_OTHERS
+
 CPU, FEATURES = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"
 PACKAGE: Final = "dropanchor_kernels"
 MADE_FOR: Final = "made-for.txt"
@@ -74,10 +76,11 @@ def _copy_files(origin: Path, into: Path) -> None:
 
     Each appears whole: another process may copy the same, or read what it has copied.
     """
-    into.mkdir(parents=True, exist_ok=True)
+    into.mkdir(DIRECTORY_MODE, parents=True, exist_ok=True)
     for file in origin.iterdir():
         part = into / f"{file.name}.{os.getpid()}"
         shutil.copyfile(file, part)
+        part.chmod(part.stat().st_mode & NOT_OF_OTHERS)
         part.replace(into / file.name)
 
 

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_service.engines.compile_apart import compile_apart
+from dropanchor_service.engines.compile_apart import compile_apart, mark_complete
 from dropanchor_service.engines.warm_up import CompilationProgress
 from dropanchor_service.runtime import kernel_cache
-from dropanchor_service.runtime.kernel_cache import VARIABLE, mark_of
+from dropanchor_service.runtime.kernel_cache import VARIABLE, is_full, mark_of
+from service.data_folder import full_disk
 from support.kernel_cache import compile_once
 from support.service import environment
 
@@ -63,13 +64,24 @@ def test_a_compiler_that_cannot_be_started_is_a_sentence_and_leaves_the_compilin
     assert progress.sentence == "The service is starting."
 
 
-def test_a_cache_that_cannot_be_written_is_not_filled(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "file").touch()
-    monkeypatch.setenv(VARIABLE, str(tmp_path / "file" / "cache"))
-    compile_apart(CompilationProgress())
-    assert caplog.messages == []
+def test_a_cache_without_room_is_not_filled(cache: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with full_disk():
+        compile_apart(CompilationProgress())
+        assert not mark_complete()
+    assert caplog.messages == [f"{cache} has no room for the compiled estimator: what it lacks is compiled into memory"]
+    assert list(cache.glob("complete-*")) == []
+
+
+def test_a_cache_with_damaged_files_is_not_full(cache: Path, caplog: pytest.LogCaptureFixture) -> None:
+    assert mark_complete()
+    assert is_full(cache)
+    first, second = sorted(cache.glob("*/*.nbc"))[:2]
+    first.write_bytes(b"")
+    second.chmod(0o666)
+    assert not is_full(cache)
+    assert caplog.messages == [f"2 files of the compiled estimator in {cache} are damaged, and are made anew"]
+    assert not first.exists()
+    assert not second.exists()
 
 
 def test_a_cache_is_full_for_one_place_and_one_processor_and_for_the_same_sources_written_anew(

@@ -44,10 +44,10 @@ def with_kernels(package: Path) -> set[Path]:
     return {source for source in package.rglob("*.py") if "njit(" in source.read_text()}
 
 
-def test_a_cache_folder_in_the_environment_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(VARIABLE, "somewhere")
+def test_a_cache_folder_in_the_environment_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "somewhere"))
     use_kernel_cache()
-    assert os.environ[VARIABLE] == "somewhere"
+    assert os.environ[VARIABLE] == str(tmp_path / "somewhere")
 
 
 def test_nothing_is_compiled_or_imported_while_samples_are_processed() -> None:

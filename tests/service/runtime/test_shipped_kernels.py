@@ -43,10 +43,10 @@ def distribution(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def started(tmp_path: Path) -> str:
+def started(tmp_path: Path, home: str = "home") -> str:
     """Run a command that compiles what is missing, in a home without a cache. Return what it says."""
     paths = os.pathsep.join([str(tmp_path / "site"), os.environ.get("PYTHONPATH", "")])
-    variables = environment(XDG_CACHE_HOME=str(tmp_path / "home"), PYTHONPATH=paths)
+    variables = environment(XDG_CACHE_HOME=str(tmp_path / home), PYTHONPATH=paths)
     clean = {name: value for name, value in variables.items() if name != VARIABLE}
     words = [sys.executable, "-c", COMPILED]
     done = subprocess.run(words, env=clean, capture_output=True, text=True, check=True)
@@ -58,6 +58,12 @@ def test_with_the_distribution_nothing_is_compiled(distribution: Path, tmp_path:
     (cache,) = (tmp_path / "home" / "dropanchor").iterdir()
     assert len(list(cache.glob("complete-*"))) == 1
     assert {file.name for file in distribution.rglob("*.nbc")} == {file.name for file in cache.rglob("*.nbc")}
+
+
+@pytest.mark.usefixtures("distribution")
+def test_with_the_distribution_nothing_is_compiled_where_no_folder_keeps_it(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert "compil" not in started(tmp_path, "file").lower()
 
 
 @pytest.mark.parametrize("part", ["sources", "numba", "Python", X86_64_V3])
