@@ -16,6 +16,7 @@ from pathlib import Path
 import orjson
 
 from dropanchor_service.checkpoints.format import CheckpointError, decoded
+from dropanchor_service.history.sqlite.damaged_file import is_damage
 from dropanchor_service.runtime.data_files import OF_SERVICE
 from dropanchor_service.runtime.recovery import COPY
 
@@ -40,14 +41,18 @@ def back_up(sources: Mapping[str, Path], target: Path) -> list[str]:
     part = target.with_name(f"{target.name}.part")
     shutil.rmtree(part, ignore_errors=True)  # of one that was stopped
     part.mkdir(parents=True)
-    problems: list[str] = []
-    for name, source in sources.items():
-        files = _files(source, OF_SERVICE) if name == DATA else _files(source)
-        for file in [source] if source.is_file() else files:
-            problems += _copied(file, part / name / file.relative_to(source))
-    _write_checksums(part)
-    os.sync()
-    part.rename(target)
+    try:
+        problems: list[str] = []
+        for name, source in sources.items():
+            files = _files(source, OF_SERVICE) if name == DATA else _files(source)
+            for file in [source] if source.is_file() else files:
+                problems += _copied(file, part / name / file.relative_to(source))
+        _write_checksums(part)
+        os.sync()
+        part.rename(target)
+    except BaseException:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
     return problems
 
 
@@ -72,7 +77,7 @@ def restore(backup: Path, targets: Mapping[str, Path]) -> None:
     for name, target in targets.items():
         if not (backup / name).is_dir():
             raise BackupError(f"{backup} holds no {name}")
-        if target.exists() and any(path.name not in _NOT_COPIED for path in target.iterdir()):
+        if any(_files(target)):
             raise BackupError(f"{target} is not empty: stop the service, and move what is in it away")
     for name, target in targets.items():
         shutil.copytree(backup / name, target, dirs_exist_ok=True)
@@ -93,7 +98,7 @@ def _files(folder: Path, patterns: Sequence[str] = ("*",)) -> Iterator[Path]:
 
 
 def _copied(file: Path, copy: Path) -> list[str]:
-    """Copy a file and read the copy. Return what is wrong with it, in a list."""
+    """Copy a file and read the copy. Return what is wrong with it, in a list. Raises BackupError and OSError."""
     copy.parent.mkdir(parents=True, exist_ok=True)
     try:
         if file.suffix == ".sqlite":
@@ -104,6 +109,10 @@ def _copied(file: Path, copy: Path) -> list[str]:
     except FileNotFoundError:  # an old checkpoint or recording that the service has deleted meanwhile
         return []
     except (ValueError, CheckpointError, sqlite3.Error) as error:
+        if isinstance(error, sqlite3.Error) and not is_damage(error):
+            raise BackupError(
+                f"{file} cannot be copied ({error}): look at the disk and at what this user may"
+            ) from error
         return [f"{file} is damaged ({error}): the service names it when it starts"]
     return []
 

@@ -11,7 +11,7 @@ import pytest
 from dropanchor_service.cli import main
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.issued import Table
-from service.data_folder import CHECKPOINT, DATABASES, Parts, file_in, opened
+from service.data_folder import CHECKPOINT, DATABASES, Parts, file_in, full_disk, opened
 
 
 @pytest.fixture(autouse=True)
@@ -96,12 +96,26 @@ def test_a_backup_that_has_changed_is_not_restored(
     assert main(["backup", str(folder / "data"), str(backup)]) == 0
     assert main(["backup", str(folder / "data"), str(backup)]) == 2
     assert "exists already" in capsys.readouterr().err
+    (target / "lost+found").mkdir(parents=True)  # a volume of its own
+    assert main(["restore", str(backup), str(target)]) == 0
+    shutil.rmtree(target)
     cut(backup / "data" / "history.sqlite")
     assert main(["restore", str(backup), str(target)]) == 2
     assert "data/history.sqlite is not what was written" in capsys.readouterr().err
     assert not target.exists()
     assert main(["restore", str(folder / "data"), str(target)]) == 2
     assert "is no backup" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("running")
+def test_a_backup_that_fails_leaves_nothing_behind(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "backups").mkdir()
+    with full_disk():
+        assert main(["backup", str(folder / "data"), str(tmp_path / "backups" / "one")]) == 2
+    assert "dropanchor backup: " in capsys.readouterr().err
+    assert list((tmp_path / "backups").iterdir()) == []
 
 
 @pytest.mark.usefixtures("running")
