@@ -214,6 +214,11 @@ def test_a_write_begins_no_transaction_and_deletes_no_summary_for_nothing(
     writer.close()
 
 
+def test_a_file_that_has_no_tables_yet_has_no_poses(tmp_path: Path) -> None:
+    (tmp_path / "h.sqlite").touch()  # as at the moment before a writer fills it
+    assert times(FileReader(tmp_path / "h.sqlite"), "a") == []
+
+
 @pytest.mark.parametrize("content", [b"this is not a database, " * 100, None])
 def test_a_file_of_another_kind_or_version_is_not_changed(tmp_path: Path, content: bytes | None) -> None:
     path = tmp_path / "h.sqlite"

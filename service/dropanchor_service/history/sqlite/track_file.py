@@ -193,7 +193,7 @@ class FileReader(TrackReader):
 
     @contextmanager
     def snapshot(self) -> Iterator[SqliteRows | None]:
-        """Return the tracks at this moment; None while there is no file. Raises HistoryError."""
+        """Return the tracks at this moment; None while there is no file with tables. Raises HistoryError."""
         if not self._path.exists():
             yield None
             return
@@ -201,7 +201,8 @@ class FileReader(TrackReader):
             uri = f"{self._path.absolute().as_uri()}?mode=ro"
             with closing(sqlite3.connect(uri, BUSY_S, uri=True)) as connection:
                 connection.execute("BEGIN")  # one state of the file for all statements
-                yield SqliteRows(connection)
+                is_made = connection.execute("SELECT EXISTS (SELECT 1 FROM sqlite_schema)").fetchone()[0]
+                yield SqliteRows(connection) if is_made else None
         except sqlite3.Error as error:
             self.has_found_damage |= is_damage(error)
             raise HistoryError(str(error)) from error
