@@ -5,7 +5,10 @@ import subprocess
 from pathlib import Path
 
 from dropanchor_schemas.wire import ENCODING_JSON
+from dropanchor_service.security.api_keys import ApiKeys
+from dropanchor_service.security.identity import Scope
 from support.commands import Ended
+from support.secured import secured_site
 from support.service import command, environment, running_service
 from support.yard import running_yard
 from support.zenoh_router import free_endpoint, free_port, wait_until
@@ -51,3 +54,22 @@ def test_a_service_that_is_impaired_or_starts_or_is_away_is_not_healthy(tmp_path
         assert (waiting.returncode, waiting.stdout.splitlines()[0]) == (1, f"{service.url}: not ready")
     away = status(f"http://127.0.0.1:{free_port()}")
     assert (away.returncode, "does not answer" in away.stderr) == (2, True)
+
+
+def test_of_a_secured_service_of_several_sites_a_key_shows_the_tags_and_no_key_the_health(tmp_path: Path) -> None:
+    secured = secured_site(tmp_path / "security")
+    key = ApiKeys(secured.folder.path).add("operator", Scope.READ)
+    config = tmp_path / "sites.toml"
+    config.write_text('[sites."north"]\n[sites."south dock"]\n')
+    secured.folder.add_site("north", 9)
+    secured.folder.add_site("south dock", 9)
+    ca = str(secured.folder.path / "ca.pem")
+    options = ("--security", str(secured.folder.path), "--config", str(config), "--zenoh-listen", secured.endpoint)
+    with running_service(*options, ca=Path(ca)) as service:
+        without = status(service.url, "--ca", ca)
+        assert (without.returncode, without.stdout.splitlines()[0]) == (0, f"{service.url}: ready")
+        assert "needs an API key: set DROPANCHOR_API_KEY" in without.stdout
+        shown = status(service.url, "--ca", ca, DROPANCHOR_API_KEY=key).stdout.splitlines()
+        assert shown[1:] == ["site north: 0 tags, 0 connected", "site south dock: 0 tags, 0 connected"]
+        one = status(service.url, "--ca", ca, "--site", "south dock", DROPANCHOR_API_KEY=key).stdout.splitlines()
+        assert one[1:] == ["site south dock: 0 tags, 0 connected"]
