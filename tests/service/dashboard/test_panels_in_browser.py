@@ -70,7 +70,7 @@ def test_every_panel_opens_from_every_other_and_asks_only_when_something_typed_w
         page.wait_for("dropanchor.events() && dropanchor.destinations().length === 1")
         assert set(page.page.evaluate("Object.keys(dropanchor.panels())")) == {
             *("tag", "start", "anchors", "plans", "zone", "destination", "rule", "measure"),
-            *("past", "heat", "figures", "display", "keys", "several"),
+            *("past", "heat", "figures", "display", "keys", "several", "trail"),
         }
         assert page.page.evaluate(WALK) == []
 

@@ -22,6 +22,7 @@ export const PLACES = {
   figures: ["window"],
   display: ["window"],
   keys: ["window"],
+  trail: ["window"],
 };
 
 export class Panels {

@@ -37,7 +37,7 @@ deleted over REST stays deleted, also when the file has it. A value that is put 
 kept as set: that gives it back. `site.json` in `data_dir` holds what was set, and nothing else.
 
 `dropanchor settings --show` prints every value in force, where it comes from, and what it hides; `--json` writes JSON.
-`GET /api/v1/settings` shows the same of a site.
+`GET /api/v1/settings` and the page show the same of a site, and the page gives values back.
 
 ## Tags
 

@@ -13,5 +13,6 @@ import phone from "./phone.js";
 import refusals from "./refusals.js";
 import service from "./service.js";
 import share from "./share.js";
+import trail from "./trail.js";
 
-export default { ...alerts, ...find, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...refusals, ...share };
+export default { ...alerts, ...find, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...refusals, ...share, ...trail };
