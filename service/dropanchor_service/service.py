@@ -96,9 +96,9 @@ class Service:
         self.metrics = Metrics()
         self.clock = UtcClock()
         self.latest = LatestPoses()
-        self._opened.enter_context(own_data_folder(settings, shared=claimed is not None))
-        put_site_files_in_place(settings)
         self._recovery = Recovery(settings.data_dir)
+        self._opened.enter_context(own_data_folder(settings, claimed is not None, self._recovery.note))
+        put_site_files_in_place(settings)
         self.sites = open_sites(settings, self._recovery)
         self._ownership = ownership_of(settings, self.sites, self.metrics, standing_by, claimed)
         self._serving = Serving(
@@ -199,6 +199,7 @@ class Service:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self._stopping.set()
+        self._serving.folders.stop_reading()
         self._opened.close()
         _log.info("stopped")
 

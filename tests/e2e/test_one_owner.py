@@ -30,3 +30,14 @@ def test_a_second_service_with_the_data_folder_ends_and_says_who_has_it(tmp_path
     with running_service("--data-dir", str(tmp_path)) as service:  # the kernel has released the lock
         assert [anchor["id"] for anchor in service.get("/api/v1/anchors")["anchors"]] == ["gate"]
         assert service.stop() == 0
+
+
+def test_a_service_whose_lock_is_a_link_ends_and_overwrites_nothing(tmp_path: Path) -> None:
+    target, folder = tmp_path / "shadow", tmp_path / "data"
+    target.write_text("root:x")
+    folder.mkdir()
+    (folder / "owner.lock").symlink_to(target)
+    ended = second(folder)
+    assert ended.returncode == 2
+    assert f"data_dir: {folder}/owner.lock is a link, and would overwrite what it leads to" in ended.stderr
+    assert target.read_text() == "root:x"

@@ -66,7 +66,7 @@ class Parts:
         self.folder = folder / "data"
         self.recovery = Recovery(self.folder)
         self.lock = ExitStack()
-        self.lock.enter_context(own_data_folder(settings, shared=False))
+        self.lock.enter_context(own_data_folder(settings, shared=False, note=self.recovery.note))
         try:
             self._open(settings)
         except SettingsError:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_tag_client.folder_lock import FILE, FolderInUseError, FolderLock, Owner
+from dropanchor_tag_client.folder_lock import FILE, FolderInUseError, FolderLock, LockIsLinkError, Owner
 from support.commands import start_python
 
 HOLD = """
@@ -74,7 +74,20 @@ def test_a_file_system_without_locks_is_said_once_and_used(
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
     monkeypatch.setattr(fcntl, "flock", without)
-    with caplog.at_level(logging.WARNING), FolderLock(tmp_path):
+    with caplog.at_level(logging.WARNING), FolderLock(tmp_path) as lock:
+        assert not lock.excludes_others
         (record,) = caplog.records
         assert "has no locks" in record.getMessage()
         assert "only one process" in record.getMessage()
+
+
+def test_a_lock_that_is_a_link_is_refused_and_its_target_stays(tmp_path: Path) -> None:
+    target = tmp_path / "shadow"
+    target.write_text("root:x")
+    (tmp_path / FILE).symlink_to(target)
+    with pytest.raises(
+        LockIsLinkError, match=r"owner\.lock is a link, and would overwrite what it leads to: remove it"
+    ):
+        FolderLock(tmp_path)
+    assert FolderLock.holder(tmp_path) is None
+    assert target.read_text() == "root:x"

@@ -2,27 +2,30 @@
 
 import json
 import logging
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 
 from dropanchor_schemas.file_names import file_name_of
+from dropanchor_schemas.sentences import say
 from dropanchor_service.runtime.atomic_file import sync_folder, write_atomically
 from dropanchor_service.runtime.data_files import OF_SITE
 from dropanchor_service.runtime.recovery import copy_of
 from dropanchor_service.runtime.written_by import mark
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
-from dropanchor_tag_client.folder_lock import FolderInUseError, FolderLock
+from dropanchor_tag_client.folder_lock import FolderInUseError, FolderLock, LockIsLinkError
 
 OWNER_FILE = "site"  # names the site whose files lie in the data folder itself
 
 _log = logging.getLogger(__name__)
 
 
-def own_data_folder(settings: Settings, shared: bool) -> AbstractContextManager[object]:
+def own_data_folder(settings: Settings, shared: bool, note: Callable[[str], object]) -> AbstractContextManager[object]:
     """Return the lock of the data folder, which only this process may write. Raises SettingsError.
 
-    shared: with the other shards of a node, whose leases tell them what each may write.
+    shared: with the other shards of a node, whose leases tell them what each may write. note: takes a sentence where
+    nothing keeps others out.
     """
     folder = settings.data_dir
     if folder is None:
@@ -30,8 +33,14 @@ def own_data_folder(settings: Settings, shared: bool) -> AbstractContextManager[
     try:
         folder.mkdir(parents=True, exist_ok=True)
         lock = FolderLock(folder, shared=shared)
+        if not lock.excludes_others:
+            note(
+                say("no_lock", "{folder} cannot be locked: a second process would lose what both write", folder=folder)
+            )
         mark(folder)
         return lock
+    except LockIsLinkError as error:
+        raise SettingsError(f"data_dir: {error}") from error
     except FolderInUseError as error:
         raise SettingsError(f"data_dir: {error}: stop it, or give this process a folder of its own") from error
     except (FileExistsError, NotADirectoryError) as error:

@@ -1,5 +1,8 @@
 """An only site becomes one of several, and the reverse, without anybody moving its files."""
 
+import errno
+import fcntl
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,9 +13,10 @@ from dropanchor_schemas import Anchor
 from dropanchor_service.events.drafts import destination_test
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.persistence.site import open_sites
-from dropanchor_service.persistence.site_files import OWNER_FILE, put_site_files_in_place
+from dropanchor_service.persistence.site_files import OWNER_FILE, own_data_folder, put_site_files_in_place
 from dropanchor_service.persistence.site_folders import SiteFolders
 from dropanchor_service.persistence.zone_events import ZoneEvents
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError, load_settings
 from dropanchor_service.store import LatestPoses
@@ -125,3 +129,13 @@ def test_a_folder_with_the_files_of_another_site_stops_the_start(tmp_path: Path)
     (tmp_path / "sites" / "a" / "site.json").rename(tmp_path / "sites" / "b" / "site.json")
     with pytest.raises(SettingsError, match="the folder of the site 'b' holds the files of 'a'"):
         start(settings_for(tmp_path, sites=["a", "b"]))
+
+
+def test_a_data_folder_that_cannot_be_locked_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def without(*_: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", without)
+    recovery = Recovery(tmp_path)
+    with own_data_folder(settings_for(tmp_path), shared=False, note=recovery.note):
+        assert recovery.problems() == [f"{tmp_path} cannot be locked: a second process would lose what both write"]

@@ -197,6 +197,7 @@ export default {
   "say.changed_meanwhile": "Jemand hat das inzwischen geändert: Laden Sie es neu und versuchen Sie es noch einmal.",
   "say.aside": "{what}: Sehen Sie sich {aside} an und nehmen Sie die Datei dann weg.",
   "say.not_aside": "{what}. Sie liegt noch da: Sehen Sie sich die Rechte ihres Ordners an, und was frühere Starts beiseitegelegt haben.",
+  "say.no_lock": "{folder} kann nicht gesperrt werden: Ein zweiter Prozess würde verlieren, was beide schreiben",
   "say.copy_used": "ihre letzte gute Kopie wird verwendet",
   "say.begins_empty": "es gab keine gute Kopie, also beginnt sie leer",
   "say.new_history": "eine neue Historie wurde begonnen",

@@ -197,6 +197,7 @@ export default {
   "say.changed_meanwhile": "Somebody changed this meanwhile: get it and try again.",
   "say.aside": "{what}: look at {aside}, then move it away.",
   "say.not_aside": "{what}. It is not set aside: look at the permissions of its folder, and at what earlier starts left.",
+  "say.no_lock": "{folder} cannot be locked: a second process would lose what both write",
   "say.copy_used": "its last good copy is used",
   "say.begins_empty": "there was no good copy, so it begins empty",
   "say.new_history": "a new history was started",
