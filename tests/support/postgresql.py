@@ -59,6 +59,20 @@ class Postgresql:
             self.process.wait()
             self.process = None
 
+    @contextmanager
+    def frozen(self) -> Iterator[None]:
+        """Stop all processes of the server in this context, as a machine does that swaps or is paused."""
+        assert self.process is not None
+        children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        pids = [self.process.pid, *map(int, children)]
+        for pid in pids:
+            os.kill(pid, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            for pid in pids:
+                os.kill(pid, signal.SIGCONT)
+
     def url(self, database: str = "postgres", user: str = "dropanchor") -> str:
         return f"postgresql://{user}@{self.host}:{self.port}/{database}"
 

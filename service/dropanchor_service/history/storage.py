@@ -32,7 +32,9 @@ class Usage:
 
 
 class Storage(Protocol):
-    """Keeps the tracks of a site. One thread writes; `reader` reads from any thread."""
+    """Keeps the tracks of a site. One thread writes; `reader` reads from any thread. waits_for: the slow part."""
+
+    waits_for: str
 
     @property
     def reader(self) -> TrackReader: ...

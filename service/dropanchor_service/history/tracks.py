@@ -29,7 +29,9 @@ class Tracks:
         self._tags = tags
         self._site = site
         self._decimation = retention.decimation()
-        self.writer: BackgroundWriter[Array] = BackgroundWriter("history", self._write, WRITE_S, MAX_QUEUED_BYTES)
+        self.writer: BackgroundWriter[Array] = BackgroundWriter(
+            "history", self._write, WRITE_S, MAX_QUEUED_BYTES, storage.waits_for
+        )
         self.written = 0
 
     def __enter__(self) -> "Tracks":

@@ -35,7 +35,7 @@ class SiteFolders:
     ) -> None:
         self._sites = sites
         self._opened = ExitStack()
-        database = open_database(settings, now_ns)
+        self._database = database = open_database(settings, now_ns)
         self.all = [
             Persistence(settings_of(settings, site.id), site.tags, site.store, now_ns, database, recovery)
             for site in sites
@@ -64,6 +64,11 @@ class SiteFolders:
 
     def __exit__(self, *_: object) -> None:
         self._opened.close()
+
+    def stop_reading(self) -> None:
+        """Let no request wait for the database any longer."""
+        if self._database is not None:
+            self._database.stop_reading()
 
     def problems(self) -> Sequence[str]:
         """Return what cannot be written or read, with several sites with their names."""

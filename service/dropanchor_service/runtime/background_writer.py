@@ -11,7 +11,7 @@ from typing import Generic, TypeVar
 from dropanchor_service.runtime.logs import RareLog
 
 RETRY_S = 1.0
-STUCK_S = 30.0
+STUCK_S = 10.0
 
 Item = TypeVar("Item")
 Write = Callable[[Sequence[Item]], None]
@@ -25,9 +25,12 @@ class BackgroundWriter(Generic[Item]):
     are dropped.
     """
 
-    def __init__(self, name: str, write: Write[Item], period_s: float, max_bytes: int) -> None:
+    def __init__(
+        self, name: str, write: Write[Item], period_s: float, max_bytes: int, waits_for: str = "the disk"
+    ) -> None:
+        """waits_for: what `write` waits for, for sentences."""
         self._log = RareLog(logging.getLogger(f"{__name__}.{name}"))
-        self._name = name
+        self._name, self._waits_for = name, waits_for
         self._write = write
         self._period_s = period_s
         self._max_bytes = max_bytes
@@ -56,7 +59,7 @@ class BackgroundWriter(Generic[Item]):
         """Why nothing can be written now: the last error, or a write that does not return."""
         began_s = self._began_s
         if began_s is not None and time.monotonic() - began_s > STUCK_S:
-            return f"{self._name} cannot be written: a write has taken more than {STUCK_S:.0f} s"
+            return f"{self._name} cannot be written: {self._waits_for} has not answered for more than {STUCK_S:.0f} s"
         return self._problem
 
     @property

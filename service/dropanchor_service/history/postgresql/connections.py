@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import BoundedSemaphore
 
-from psycopg import Connection
+from psycopg import Connection, OperationalError
 from psycopg.pq import TransactionStatus
 
 from dropanchor_service.history.errors import HistoryError
@@ -35,6 +35,9 @@ class Connections:
                 connection = self._idle_one() or self._connect()
                 try:
                     yield connection
+                except OperationalError:
+                    self.close()  # the others are no better, and each would be waited for
+                    raise
                 finally:
                     self._take_back(connection)
         finally:

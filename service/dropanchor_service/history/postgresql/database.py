@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from threading import Lock
+from threading import Event, Lock
 from typing import Any
 
 import psycopg
@@ -15,12 +15,14 @@ from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.postgresql.connections import Connections
 from dropanchor_service.history.postgresql.days import DAY_NS, drop_day, existing_days, used_bytes
 from dropanchor_service.history.postgresql.errors import sentence
+from dropanchor_service.history.postgresql.patience import PatientConnection
 from dropanchor_service.history.postgresql.schema import SCHEMA, prepare, require_current
 from dropanchor_service.history.storage import Usage
 
 MOST_WRITING, MOST_READING = 2, 4  # connections of a service
 MAINTAIN_S = 60.0
 LOCK_TIMEOUT = "5s"
+READ_S = 12.0  # for a statement that somebody waits for
 AWAY_S = 10.0  # for so long readers take the last refusal for theirs, unless the writer connects
 _DEFAULTS = {
     "application_name": "dropanchor",
@@ -56,7 +58,10 @@ class Database:
         self._now_ns = now_ns
         self._writing = Connections(self._connect_to_write, MOST_WRITING)
         self._reading = Connections(self._connect_to_read, MOST_READING)
-        self._away: tuple[float, str] | None = None  # when no connection could be made, and why
+        self._away: tuple[float, str] | None = (
+            None  # when no connection could be made or the server fell silent, and why
+        )
+        self._stops = Event()
         self._maintaining = Lock()
         self._maintained_s = -MAINTAIN_S
         self.usage = Usage()
@@ -74,6 +79,10 @@ class Database:
                 yield connection
         except NoHistoryYetError:
             yield None
+
+    def stop_reading(self) -> None:
+        """Let nobody who reads wait any longer: the service stops."""
+        self._stops.set()
 
     def close(self) -> None:
         """Close the connections that nobody uses."""
@@ -114,10 +123,11 @@ class Database:
         return connection
 
     def _connect_to_read(self) -> Connection:
-        if self._away is not None and time.monotonic() - self._away[0] < AWAY_S:
-            raise HistoryError(self._away[1])  # the writer tries: who answers current poses must not wait for it
+        self._refuse_while_away()
         connection = self._connect()
+        connection.silence_s, connection.give_up = READ_S + 2.0, self._stops
         try:
+            connection.execute(f"SET statement_timeout = '{READ_S:.0f}s'")
             if not require_current(connection):
                 raise NoHistoryYetError
         except BaseException:
@@ -125,10 +135,14 @@ class Database:
             raise
         return connection
 
-    def _connect(self) -> Connection:
+    def _refuse_while_away(self) -> None:
+        if self._away is not None and time.monotonic() - self._away[0] < AWAY_S:
+            raise HistoryError(self._away[1])  # the writer tries: who answers current poses must not wait for it
+
+    def _connect(self) -> PatientConnection:
         password = {} if self._password_file is None else {"password": _password_in(self._password_file)}
         try:
-            connection = psycopg.connect(make_conninfo(**self._parameters | password), autocommit=True)
+            connection = PatientConnection.connect(make_conninfo(**self._parameters | password), autocommit=True)
         except psycopg.Error as error:
             self._away = (time.monotonic(), sentence(error))
             raise

@@ -40,6 +40,7 @@ class PostgresqlStorage:
     """
 
     damaged: Sequence[str] = ()
+    waits_for = "the database"
 
     def __init__(
         self,

@@ -23,6 +23,8 @@ INSTEAD = say("new_history", "a new history was started")
 class SqliteStorage:
     """The `Storage` in a file of a folder. `write` raises sqlite3.Error and OSError."""
 
+    waits_for = "the disk"
+
     def __init__(
         self, folder: Path, retention: Retention, now_ns: Callable[[], int], recovery: Recovery | None = None
     ) -> None:
