@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import partial
 from threading import Event
-from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 import zenoh
@@ -38,6 +37,7 @@ from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.ownership.choose import ownership_of
 from dropanchor_service.ownership.processed import Processed
+from dropanchor_service.persistence.reloading import reload_settings
 from dropanchor_service.persistence.site import open_sites
 from dropanchor_service.persistence.site_files import own_data_folder, put_site_files_in_place
 from dropanchor_service.runtime.clock import UtcClock
@@ -145,7 +145,8 @@ class Service:
             # The HTTP server is told to stop first and joined last, so that a stuck client does not delay the rest.
             self._opened.callback(self._http.ask_to_stop)
             self._opened = self._opened.pop_all()
-        _log.info("ready at %s, %s, engine %s", self.url, self._name(), self._settings.engine)
+        name = f"{len(self.sites)} sites" if self.sites.only is None else f"site {self.sites.only.id}"
+        _log.info("ready at %s, %s, engine %s", self.url, name, self._settings.engine)
         return self
 
     def _start_checkpoints(self) -> None:
@@ -161,9 +162,6 @@ class Service:
     def _shared(self) -> dict[str, Shared]:
         """Return what people change over REST and the owner of the sites shares with its successor, by name."""
         return {**self._serving.zone_events.shared, **{f"{site.id}/site.json": site.store for site in self.sites}}
-
-    def _name(self) -> str:
-        return f"{len(self.sites)} sites" if self.sites.only is None else f"site {self.sites.only.id}"
 
     def _build_ingest(self, engine: Engine) -> None:
         guarded = GuardedEngine(engine, self.sites, self.metrics)
@@ -195,13 +193,15 @@ class Service:
             self._checkpoints.between_turns()
         self._processed.between_turns()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stopping.set()
         self._serving.folders.stop_reading()
         self._opened.close()
         _log.info("stopped")
+
+    def reload(self, settings: Settings) -> None:
+        reload_settings(self._settings, settings, self.sites)
+        self._http.reload_certificate()
 
     def problems(self) -> Sequence[str]:
         """Return why the service cannot do its work now; empty when it can."""
@@ -211,10 +211,9 @@ class Service:
 
     def impairments(self) -> Sequence[str]:
         """Return what does not work although the service can do its main work."""
-        of_cluster = self._ownership.impairments()
-        damaged = self._recovery.problems()
         of_checkpoints = self._checkpoints.problem if self._checkpoints else None
-        found = [*of_cluster, *self._serving.problems(), *damaged, of_checkpoints]
+        of_files = self._recovery.problems()
+        found = [*self._ownership.impairments(), *self._serving.problems(), *of_files, of_checkpoints]
         return [problem for problem in found if problem is not None]
 
     @property

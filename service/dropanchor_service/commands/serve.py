@@ -1,6 +1,7 @@
 """`dropanchor serve`: run the service until it is stopped."""
 
 import argparse
+import logging
 import sys
 from typing import Protocol
 
@@ -21,6 +22,7 @@ from dropanchor_service.zenoh_io.session import ZenohError
 DESCRIPTION = """\
 Runs the service until Ctrl-C or SIGTERM. Without settings, the site is `default`, a built-in Zenoh router listens on
 the loopback, the anchor of the first range becomes the origin, and every tag that sends samples gets a track.
+SIGHUP reads the settings of anchors and tags and the certificate again, and says what else needs a restart.
 """
 EPILOG = """\
 examples:
@@ -43,6 +45,9 @@ a settings file:
   height_m = 1.2
   start = { x = 10.0, y = 0.0, heading_rad = 1.57 }
 """
+
+_log = logging.getLogger(__name__)
+
 EXIT_ERROR = 2
 EXIT_DIED = 1
 EXIT_GONE = 75  # EX_TEMPFAIL of sysexits.h: another process serves the sites, and a restart begins as a standby
@@ -70,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
             show_addresses(service.url, sys.stdout)
             give_back_files()
             heap = HeapTrimmer()
-            stopped = interrupt.wait(lambda: supervise(service, systemd, heap))
+            stopped = interrupt.wait(lambda: supervise(service, systemd, heap), lambda: reload(service, arguments))
             systemd.stopping()
     except KeyboardInterrupt:
         return 0
@@ -81,6 +86,14 @@ def run(arguments: argparse.Namespace) -> int:
         sys.stderr.write(f"dropanchor serve: {service.gone}. Started again, this process is a standby\n")
         return EXIT_GONE
     return 0 if stopped else EXIT_DIED
+
+
+def reload(service: Service, arguments: argparse.Namespace) -> None:
+    """Read the settings again. Settings with an error change nothing."""
+    try:
+        service.reload(served_settings(settings_of(arguments)))
+    except SettingsError as error:
+        _log.error("the settings cannot be used, and stay as they were: %s", error)
 
 
 class Supervised(Protocol):

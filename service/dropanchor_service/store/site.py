@@ -92,6 +92,12 @@ class SiteStore:
         self._values = self._values.model_copy(update={"site": site})
         self._save(self._values)
 
+    def configure(self, configured: Configured) -> None:
+        """Let this be what the settings say. What was set over REST stays."""
+        with self._lock:
+            self.configured, self.default_settings = configured, configured.defaults
+            self._apply(self._values, self._values.in_force(configured))
+
     def share(self, saved: bytes | None, save: Save) -> None:
         """Go on from what another process has saved of this site; see `Shared`. Call this before the first message."""
         self._save_bytes = save
@@ -107,10 +113,6 @@ class SiteStore:
     def on_change(self, told: Callable[[], None]) -> None:
         """Call this after every change, on the thread that makes it."""
         self._told.append(told)
-
-    def _tell(self) -> None:
-        for told in self._told:
-            told()
 
     @property
     def site(self) -> Site:
@@ -150,9 +152,7 @@ class SiteStore:
     def restore_indices(self, anchors: Sequence[Anchor]) -> None:
         """Give these anchors of an earlier store, in order of their index, the same index here. Call this first."""
         self._indices = AnchorIndices(anchors)
-        self._indices.add(self.site.anchors)
-        self.version += 1
-        self._tell()
+        self._apply(self._values, self._document)
 
     def bind_first(self, anchor: str) -> bool:
         """Put `anchor` at the origin if the site has no anchor yet. Return whether it did."""
@@ -293,4 +293,5 @@ class SiteStore:
         self._groups = groups_of(document.tags, self.default_settings)
         self._indices.add(self.site.anchors)
         self.version += 1
-        self._tell()
+        for told in self._told:
+            told()

@@ -72,5 +72,5 @@ def test_a_write_that_does_not_return_is_a_problem(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("dropanchor_service.runtime.background_writer.STUCK_S", 0.0)
     writer: BackgroundWriter[int] = BackgroundWriter("test", lambda _: seen.append(writer.problem), 3600.0, 1000)
     assert writer.flush()
-    assert seen == ["test cannot be written: a write has taken more than 0 s"]
+    assert seen == ["test cannot be written: the disk has not answered for more than 0 s"]
     assert writer.problem is None

@@ -1,7 +1,9 @@
 """Run the HTTP server in its own thread, so that the main thread can supervise and stop it."""
 
 import asyncio
+import logging
 import socket
+import ssl
 import threading
 import time
 from typing import Any
@@ -9,6 +11,8 @@ from typing import Any
 from dropanchor_service.api.http.server import Server
 
 HANDSHAKE_S = 10.0
+
+_log = logging.getLogger(__name__)
 
 
 class _Loop(asyncio.SelectorEventLoop):
@@ -37,6 +41,20 @@ class HttpThread:
     def ask_to_stop(self) -> None:
         """Tell the server to shut down, without waiting."""
         self._server.ask_to_stop()
+
+    def reload_certificate(self) -> None:
+        """Use the certificate as its files are now, for new connections. One that is unusable changes nothing."""
+        config = self._server.config
+        if config.ssl is None or config.ssl_certfile is None:
+            return
+        files = (config.ssl_certfile, config.ssl_keyfile)
+        try:
+            ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(*files)
+            config.ssl.load_cert_chain(*files)
+        except (OSError, ssl.SSLError) as error:
+            _log.error("the certificate %s cannot be used (%s): the former one stays", config.ssl_certfile, error)
+        else:
+            _log.info("reloaded: the certificate %s", config.ssl_certfile)
 
     def join(self, timeout_s: float) -> None:
         if self._thread.ident is not None:
