@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from prometheus_client import generate_latest
 
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.estimation.columns import POSE, State
+from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.postgresql.database import Database
 from dropanchor_service.history.storage import Retention
 from dropanchor_service.metrics.registry import Metrics
@@ -19,6 +21,7 @@ from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError, load_settings
 from support.api import T_NS, ApiBench, ask, kind_of, make_api_bench
 from support.history_places import opened
+from support.pgbouncer import needs_pgbouncer, running_pgbouncer
 from support.postgresql import Postgresql, needs_postgresql
 
 SECOND = 1_000_000_000
@@ -147,3 +150,17 @@ def test_a_history_that_is_off_needs_no_database() -> None:
     (site,) = open_sites(settings)
     assert open_database(settings, lambda: 0) is None
     assert Persistence(settings, site.tags, site.store, lambda: 0, None).tracks is None
+
+
+@needs_postgresql
+@needs_pgbouncer
+@pytest.mark.parametrize(("pool_mode", "is_refused"), [("transaction", True), ("session", False)])
+def test_a_pooler_that_lends_by_transaction_is_named(postgresql: Postgresql, pool_mode: str, is_refused: bool) -> None:
+    name = postgresql.new_database().rpartition("/")[2]
+    with (
+        running_pgbouncer(postgresql, postgresql.folder, pool_mode) as port,
+        opened(f"postgresql://dropanchor@127.0.0.1:{port}/{name}", T_NS) as database,
+        pytest.raises(HistoryError, match="set pool_mode = session") if is_refused else nullcontext(),
+        database.writing(),
+    ):
+        pass

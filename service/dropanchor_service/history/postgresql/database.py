@@ -16,6 +16,7 @@ from dropanchor_service.history.postgresql.connections import Connections
 from dropanchor_service.history.postgresql.days import DAY_NS, drop_day, existing_days, used_bytes
 from dropanchor_service.history.postgresql.errors import sentence
 from dropanchor_service.history.postgresql.patience import PatientConnection
+from dropanchor_service.history.postgresql.pooler import refuse_transaction_pooler
 from dropanchor_service.history.postgresql.schema import SCHEMA, prepare, require_current
 from dropanchor_service.history.storage import Usage
 
@@ -116,6 +117,7 @@ class Database:
     def _connect_to_write(self) -> Connection:
         connection = self._connect()
         try:
+            refuse_transaction_pooler(connection, self._connect)
             prepare(connection)
         except BaseException:
             connection.close()
