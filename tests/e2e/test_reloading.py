@@ -3,9 +3,12 @@
 import os
 import pty
 import signal
+import ssl
 import subprocess
 from pathlib import Path
+from urllib.parse import urlsplit
 
+from support.secured import secured_site
 from support.service import Running, command, environment, running_service
 from support.zenoh_router import free_endpoint, wait_until
 
@@ -86,3 +89,22 @@ def _control(terminal: int) -> None:
     import termios
 
     fcntl.ioctl(terminal, termios.TIOCSCTTY, 0)
+
+
+def test_a_hangup_takes_over_a_renewed_certificate(tmp_path: Path) -> None:
+    folder = secured_site(tmp_path / "security").folder
+    certificate, key = folder.certificate("service"), folder.key("service")
+    config = tmp_path / "d.toml"
+    config.write_text(f'[http]\ncertificate = "{certificate}"\nkey = "{key}"\n')
+    with running_service("--config", str(config), ca=folder.certificate("ca")) as service:
+        address = urlsplit(service.url)
+        assert address.hostname is not None
+        assert address.port is not None
+        served = ssl.get_server_certificate((address.hostname, address.port))
+        folder.renew([], days=20)
+        assert str(certificate) in hang_up(service, "reloaded: the certificate")
+        assert ssl.get_server_certificate((address.hostname, address.port)) not in ("", served)
+        certificate.write_text("no certificate")
+        assert "the former one stays" in hang_up(service, "cannot be used")
+        assert service.get("/api/v1/poses")
+        assert service.stop() == 0
