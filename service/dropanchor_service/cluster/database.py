@@ -5,6 +5,8 @@ from typing import Any
 import psycopg
 from psycopg.conninfo import make_conninfo
 
+from dropanchor_service.history.postgresql.patience import PatientConnection
+
 Connection = psycopg.Connection[tuple[Any, ...]]
 DatabaseError = psycopg.Error
 
@@ -17,6 +19,7 @@ _OPTIONS: dict[str, Any] = {
     "keepalives_count": 2,
 }
 """A network that swallows everything counts as an error within seconds."""
+SILENCE_S = 15.0  # of a server that is frozen; statements take some ms, and large checkpoints some seconds
 
 _LOCK = 0x64726F70  # of ours, so that two processes do not make the tables at once
 _TABLES = """
@@ -80,7 +83,9 @@ def connect(url: str, name: str) -> Connection:
 
     The last commits before a crash of the database may be lost, unless a transaction sets that it waits for the disk.
     """
-    connection = psycopg.connect(make_conninfo(url, application_name=f"dropanchor {name}", **_OPTIONS), autocommit=True)
+    conninfo = make_conninfo(url, application_name=f"dropanchor {name}", **_OPTIONS)
+    connection = PatientConnection.connect(conninfo, autocommit=True)
+    connection.silence_s = SILENCE_S
     try:
         connection.execute("SET synchronous_commit = off")
     except psycopg.Error:
