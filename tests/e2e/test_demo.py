@@ -113,7 +113,6 @@ def test_a_missing_recording_is_reported_and_the_data_folder_kept_private(tmp_pa
 
 def test_tags_with_an_unknown_start_are_ambiguous_at_first() -> None:
     with running_demo("--tags", "2", "--unknown-start") as (_, url):
-        wait_until(lambda: any(pose["hypotheses"] for pose in poses(url).values()))
-        pose = next(pose for pose in poses(url).values() if pose["hypotheses"])
+        pose, *_ = wait_until(lambda: [pose for pose in poses(url).values() if pose["hypotheses"]])
         assert pose["state"] == "ambiguous"
         assert sum(mode["weight"] for mode in pose["hypotheses"]) <= 1.0 + 1e-9

@@ -11,11 +11,13 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, TypeVar
 
 import zenoh
 
 from support.patience import PATIENCE_S
+
+T = TypeVar("T")
 
 _ROUTER_PROGRAM = """
 import sys, zenoh
@@ -113,10 +115,14 @@ def dropping_router(key: str) -> Iterator[str]:
         yield endpoint
 
 
-def wait_until(condition: Callable[[], object], timeout_s: float = PATIENCE_S) -> None:
-    """Wait until the condition is true. Fail the test when it is still false after `timeout_s`."""
+def wait_until(condition: Callable[[], T], timeout_s: float = PATIENCE_S) -> T:
+    """Wait until what the condition returns is true, and return it: asked again, it may be something else.
+
+    Fail the test when it is still false after `timeout_s`.
+    """
     deadline, pause_s = time.monotonic() + timeout_s, 0.005
-    while not condition():
+    while not (found := condition()):
         assert time.monotonic() < deadline, f"not within {timeout_s} s"
         time.sleep(pause_s)
         pause_s = min(1.5 * pause_s, 0.1)  # a condition may cost much more than the pause, here and in the service
+    return found
