@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id, refuse_pattern
 from dropanchor_schemas.sentences import say
-from dropanchor_service.runtime.atomic_file import write_atomically
+from dropanchor_service.runtime.atomic_file import sync_folder, write_atomically
 from dropanchor_service.runtime.written_by import later_in, mark
 from dropanchor_service.security.files import PRIVATE, exclusive_lock, may_write
 from dropanchor_service.security.identity import Authenticator, Identity, Scope, UnauthenticatedError
@@ -190,8 +190,11 @@ class ApiKeys:
     @contextmanager
     def _changing(self) -> Iterator[None]:
         """Lock the file, so that no change of another process is lost. Raises FolderInUseError and OSError."""
-        self._file.parent.mkdir(mode=0o700, exist_ok=True)
-        with exclusive_lock(self._file.parent):
+        folder = self._file.parent
+        if not folder.exists():
+            folder.mkdir(mode=0o700, exist_ok=True)
+            sync_folder(folder.parent)
+        with exclusive_lock(folder):
             yield
 
     @property
