@@ -184,6 +184,7 @@ def test_a_node_has_its_own_page_health_and_metrics(cluster: Cluster) -> None:
     assert client.get("/api/v1/health/ready").json() == {"status": "ready", "impaired": [], "impaired_phrases": []}
     assert client.get("/api/v1/health/live", headers={"authorization": ""}).status_code == 200
     assert "dropanchor_node_buckets 3.0" in client.get("/metrics").text
+    assert client.get("/api/v1/sites/017.a/poses").status_code == 200
     assert 'dropanchor_node_requests_total{status="200"}' in client.get("/metrics").text
     assert kind_of(client.get("/metrics", headers={"authorization": ""})) == "unauthenticated"
     assert kind_of(client.get("/metrics", headers=bearer(cluster.secrets["one"]))) == "forbidden"
