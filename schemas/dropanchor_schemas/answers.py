@@ -77,6 +77,11 @@ class TagStatus(_Answer):
         description="null: one program sends motion and ranges and stamps both by one clock, or one of them has not "
         "come for a minute."
     )
+    clock_error_s: float | None = Field(
+        default=None,
+        description="How far the clock of the tag is ahead of UTC, which the service corrects; negative: behind. null: "
+        "it is right as far as the service knows, or counts from boot.",
+    )
     needs_care: list[Care] = Field(description="What a person should do for the tag; empty if nothing.")
     remote_settings: RemoteSettingsStatus
     settings: TagSettings

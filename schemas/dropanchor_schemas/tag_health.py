@@ -75,7 +75,15 @@ class Care(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    reason: Literal["sensor_fault", "battery_low", "firmware_differs", "spool_growing", "clock_offset", "no_contact"]
+    reason: Literal[
+        "sensor_fault",
+        "battery_low",
+        "firmware_differs",
+        "spool_growing",
+        "clock_offset",
+        "clock_wrong",
+        "no_contact",
+    ]
     hint: str
     hint_phrase: Phrase | None = Field(default=None, description="The hint by its code; null without one.")
     setting: dict[str, str | bool] | None = Field(

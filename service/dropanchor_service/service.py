@@ -104,8 +104,7 @@ class Service:
         self._serving = Serving(
             settings, self._credentials, self.sites, self.latest, self.clock.now_ns, self.metrics, self._recovery
         )
-        self._publishers = Publishers()
-        tracks = [one.tracks for one in self._serving.folders.all]
+        tracks, self._publishers = [one.tracks for one in self._serving.folders.all], Publishers()
         self.answers = answers_of_sites(self.sites, self.latest, self.clock.now_ns, tracks, self._publishers)
         self._period = Period(settings.ingest.period_ms * 1e-3)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
@@ -212,8 +211,8 @@ class Service:
     def impairments(self) -> Sequence[str]:
         """Return what does not work although the service can do its main work."""
         of_checkpoints = self._checkpoints.problem if self._checkpoints else None
-        of_files = self._recovery.problems()
-        found = [*self._ownership.impairments(), *self._serving.problems(), *of_files, of_checkpoints]
+        of_files, of_clock = self._recovery.problems(), self.clock.problem
+        found = [*self._ownership.impairments(), *self._serving.problems(), *of_files, of_checkpoints, of_clock]
         return [problem for problem in found if problem is not None]
 
     @property
@@ -243,7 +242,8 @@ class Service:
             return None
         state = ServiceState(self.sites, self.latest, engine, self._publishers)
         kept = self._ownership.checkpoints(state, self._recovery)
-        return None if kept is None else CheckpointThread(state, kept, self.metrics, self._settings.checkpoint_s)
+        every_s = self._settings.checkpoint_s
+        return None if kept is None else CheckpointThread(state, kept, self.metrics, every_s, self.clock)
 
     def _write_last_checkpoint(self, checkpoints: CheckpointThread) -> None:
         if self.gone:

@@ -5,11 +5,11 @@ from support.traffic import T0_NS
 
 
 class ManualClock(UtcClock):
-    """Return `t_ns`, UTC, until the test sets another time."""
+    """A host whose clock shows `t_ns`, UTC, until the test sets another time."""
 
     def __init__(self, t_ns: int = T0_NS) -> None:
         super().__init__()
         self.t_ns = t_ns
 
     def now_ns(self) -> int:
-        return self.t_ns
+        return self.t_ns + self.correction_ns

@@ -69,6 +69,17 @@ def command(*arguments: str) -> list[str]:
     return [sys.executable, "-m", "dropanchor_service", *arguments]
 
 
+def with_wrong_clock(words: list[str], ahead_s: float) -> list[str]:
+    """Return the command for a Python program so that the clock of its host is ahead by this much."""
+    ahead_ns = round(ahead_s * 1e9)
+    code = (
+        "import runpy, sys, time; now = time.time_ns; "
+        f"time.time_ns = lambda: now() + {ahead_ns}; time.time = lambda: time.time_ns() * 1e-9; "
+        "runpy.run_module(sys.argv.pop(1), run_name='__main__', alter_sys=True)"
+    )
+    return [words[0], "-c", code, *words[2:]]
+
+
 def environment(**more: str) -> dict[str, str]:
     """Return this process's environment without its Dropanchor settings, with our packages and these variables."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith("DROPANCHOR_")}
@@ -83,16 +94,21 @@ def running_service(
     ready: bool = True,
     subcommand: str = "serve",
     ca: Path | None = None,
+    clock_ahead_s: float = 0.0,
 ) -> Iterator[Running]:
-    """Run `dropanchor serve` on free ports until the block ends. ready: wait until it reports that it is ready."""
+    """Run `dropanchor serve` on free ports until the block ends. ready: wait until it reports that it is ready.
+
+    clock_ahead_s: how far the clock of its host is ahead.
+    """
     compile_once()
     zenoh = endpoint or free_endpoint()
     has_zenoh = subcommand != "api" and not any("--zenoh" in argument for argument in arguments)
     listening = ("--zenoh-listen", zenoh) if has_zenoh else ()
     began_s = time.monotonic()
-    process = subprocess.Popen(
-        command(subcommand, "--port", "0", *listening, *arguments), stderr=subprocess.PIPE, text=True, env=environment()
-    )
+    words = command(subcommand, "--port", "0", *listening, *arguments)
+    if clock_ahead_s:
+        words = with_wrong_clock(words, clock_ahead_s)
+    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment())
     running = Running(process, zenoh, [], began_s, ca=ca)
     reader = Thread(target=_read, args=(running,), daemon=True)
     reader.start()

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 import orjson
 
+from dropanchor_service.answers.care import wrong_clock
 from dropanchor_service.answers.columns import aged_poses, columns_of, ellipse_95
 from dropanchor_service.answers.findings import sentence_of
+from dropanchor_service.answers.hints import SENDING_S, late
 from dropanchor_service.answers.json_template import Filled
 from dropanchor_service.answers.pose_at_time import BeforeMemoryError, pose_at
 from dropanchor_service.answers.pose_fields import FRAME_FIELDS, POSE_FIELDS, ellipse_values
@@ -22,6 +24,7 @@ from dropanchor_service.answers.track_pages import pose_in_tracks
 from dropanchor_service.answers.unused import hints_about_unused
 from dropanchor_service.estimation.columns import POSE, Array, State
 from dropanchor_service.history.tracks import Tracks
+from dropanchor_service.store.arrivals import LATE_S
 from dropanchor_service.store.clock_offsets import ClockOffsets, NoClockOffsets
 from dropanchor_service.store.health import HealthTable
 from dropanchor_service.store.latest_poses import LatestPoses
@@ -85,9 +88,18 @@ class Answers:
         unknown = self.unknown_anchor_of(tag)
         if unknown is None:
             unused = hints_about_unused(np.array([tag.row]), self.tags, self.now_ns())
-            return next((hint for hint, _ in unused), "")
+            return next((hint for hint, _ in unused), "") or self._hint_about_clock(tag, now_ns)
         range_ns = int(self.tags.arrivals.of(np.array([tag.row]))["range_ns"][0])
         return hint_about(unknown, hears_others=now_ns - range_ns <= FRESH_NS)
+
+    def _hint_about_clock(self, tag: Tag, now_ns: int) -> str:
+        """Return what to do about a clock that is off, or about samples that come late."""
+        error_s = self.tags.rows.clock_errors.get(tag.row)
+        if error_s is not None:
+            return wrong_clock(error_s)
+        arrival = self.tags.arrivals.of(np.array([tag.row]))[0]
+        is_late = arrival["delay_s"] >= LATE_S and (now_ns - arrival["arrival_ns"]) * 1e-9 < SENDING_S
+        return late(round(float(arrival["delay_s"]))) if is_late else ""
 
     def tags_in_group(self, group: str) -> list[str]:
         """Return the tags whose settings name this group."""

@@ -5,6 +5,7 @@ from typing import Any
 
 from dropanchor_schemas.sentences import phrase_of, say
 from dropanchor_service.answers.findings import sentence_of
+from dropanchor_service.runtime.clock import ahead_or_behind, duration
 from dropanchor_service.store import HealthTable, Tag
 from dropanchor_service.store.clock_offsets import ClockOffset
 from dropanchor_service.store.health import HealthRecord
@@ -18,7 +19,15 @@ _NOT_CORRECTED = say("clock_advice", "let both devices set their time automatica
 BATTERY_LOW = 0.2
 SPOOL_RISES = 3  # reports in a row
 NO_CONTACT_S = 300.0
-REASONS = ("sensor_fault", "battery_low", "firmware_differs", "spool_growing", "clock_offset", "no_contact")
+REASONS = (
+    "sensor_fault",
+    "battery_low",
+    "firmware_differs",
+    "spool_growing",
+    "clock_offset",
+    "clock_wrong",
+    "no_contact",
+)
 
 
 def health_answer(record: HealthRecord | None, now_ns: int) -> dict[str, Any] | None:
@@ -37,6 +46,8 @@ def care_of(
     hints = {} if record is None else _of_values(record, health.majority_firmware)
     if clock_offset is not None and (clock_hint := _clock_hint(clock_offset)):
         hints["clock_offset"] = clock_hint
+    if (clock_error_s := tag.rows.clock_errors.get(tag.row)) is not None:
+        hints["clock_wrong"] = wrong_clock(clock_error_s)
     last_ns = max(tag.last_heard_ns or 0, 0 if record is None or tag.last_heard_ns else record.received_ns)
     if last_ns and _age_s(last_ns, now_ns) > NO_CONTACT_S:
         hints["no_contact"] = _no_contact(tag.online, _age_s(last_ns, now_ns))
@@ -111,15 +122,23 @@ def _disagreement(offset_s: float, by_motion_s: float) -> str:
     )
 
 
+def wrong_clock(error_s: float) -> str:
+    """Return what to do about a clock that is ahead by this much, or behind if that is negative."""
+    return say(
+        "clock_wrong",
+        "Its clock is {time} {side} that of the service: the service corrects this. Let the tag set its time "
+        "automatically.",
+        time=duration(round(error_s * 1e9)),
+        side=_side(error_s),
+    )
+
+
 def _side(offset_s: float) -> str:
-    return say("ahead_of", "ahead of") if offset_s > 0 else say("behind", "behind")
+    return ahead_or_behind(offset_s > 0)
 
 
 def _no_contact(online: bool, age_s: float) -> str:
-    if age_s < 7200:
-        time = say("minutes", "{n} minutes", n=f"{age_s / 60:.0f}")
-    else:
-        time = say("hours", "{n} hours", n=f"{age_s / 3600:.0f}")
+    time = duration(round(age_s * 1e9))
     if online:
         return say("no_samples", "Connected, but has sent no samples for {time}: check its sensors.", time=time)
     return say("no_contact", "Has sent nothing for {time}: check its power and its network.", time=time)

@@ -7,12 +7,12 @@ import time
 from dropanchor_service.checkpoints.format import CheckpointError, Checkpoints, Snapshot
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.runtime.worker import Worker
 
 OLD_S = 5.0  # an older newest checkpoint is a problem
 REST = 3  # pause, relative to the duration of the last write, so that a slow disk is not always busy
-AHEAD_S = 60.0  # by which a checkpoint may be ahead: the clocks of two machines differ
 _TURN_S = 1.0  # wait for a turn of the ingest thread
 
 _log = logging.getLogger(__name__)
@@ -21,13 +21,16 @@ _log = logging.getLogger(__name__)
 class CheckpointThread(Worker):
     """Writes checkpoints on a thread of its own. The ingest thread calls `between_turns`."""
 
-    def __init__(self, state: ServiceState, kept: Checkpoints, metrics: Metrics, period_s: float) -> None:
+    def __init__(
+        self, state: ServiceState, kept: Checkpoints, metrics: Metrics, period_s: float, clock: UtcClock
+    ) -> None:
         super().__init__("checkpoints", _TURN_S)
         self._log = RareLog(_log)
         self._state = state
         self._kept = kept
         self._metrics = metrics
         self._period_s = period_s
+        self._clock = clock
         self._requested = threading.Event()
         self._taken = threading.Event()
         self._snapshot: Snapshot | None = None
@@ -46,12 +49,19 @@ class CheckpointThread(Worker):
             _log.info("there is no usable checkpoint: all tags start afresh")
             return
         try:
-            _refuse_future(snapshot)
             self._state.restore(snapshot)
         except CheckpointError as error:
             _log.warning("the newest checkpoint is not used: %s; all tags start afresh", error)
             return
         _log.info("going on from a checkpoint with %d tags", len(snapshot.document["tags"]))
+        self._go_on_in_time(int(snapshot.arrays["counts"]["last_heard_ns"].max(initial=0)))
+
+    def _go_on_in_time(self, heard_ns: int) -> None:
+        """Let the service's clock go on from when the last message arrived, if the host shows an earlier time."""
+        by_ns = self._clock.go_on_from(heard_ns)
+        if by_ns:
+            self._metrics.host_clock.set(-by_ns * 1e-9)
+            _log.warning("%s", self._clock.problem)
 
     def start(self) -> None:
         self._current_s = time.monotonic()
@@ -131,10 +141,3 @@ class CheckpointThread(Worker):
         self._messages, self._current_s = self._of
         self._metrics.checkpoints.labels("written").inc()
         self._metrics.checkpoint_bytes.set(size)
-
-
-def _refuse_future(snapshot: Snapshot) -> None:
-    """Raise CheckpointError for a checkpoint that is newer than now: until its time comes, its poses would not age."""
-    ahead_s = (int(snapshot.arrays["counts"]["last_heard_ns"].max(initial=0)) - time.time_ns()) * 1e-9
-    if ahead_s > AHEAD_S:
-        raise CheckpointError(f"it is {ahead_s:.0f} s ahead of the clock of this machine, which was set back")

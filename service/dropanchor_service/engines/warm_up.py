@@ -253,7 +253,7 @@ def _ingest(payloads: list[bytes]) -> None:
     sequenced = publishers.sequence(of_turn, 0)
     decoded, _ = screen(read_samples(read, sequenced.due))
     samples = [(decoded.imu["message"], decoded.imu["t_ns"]), (decoded.ranges["message"], decoded.ranges["t_ns"])]
-    offsets = publishers.time_offsets(of_turn, sequenced, samples)
+    offsets = publishers.time_offsets(of_turn, sequenced, samples, 0)
     for messages, t_ns in samples:
         shift_times(t_ns, messages, offsets.messages)
         time_spans(t_ns, messages, np.zeros(n, np.int64), np.zeros(n, np.int64))

@@ -1,7 +1,7 @@
 """Messages that a turn left behind: a queue for each tag, of which the turns take by fair shares."""
 
 from collections import Counter, deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from operator import itemgetter
 
@@ -80,6 +80,10 @@ class Backlog:
         """Return the arrival of each message, in the order of `columns`."""
         return np.fromiter(map(ARRIVAL, chain.from_iterable(self._queues.values())), np.int64, self._count)
 
+    def move_arrivals(self, by_ns: int) -> None:
+        """Follow the service's clock, which was moved."""
+        self._queues = {row: deque(moved(queue, by_ns)) for row, queue in self._queues.items()}
+
     def drop(self, rows: Array) -> list[Message]:
         """Take out the oldest message of a tag for each time that its row is in `rows`."""
         dropped: list[Message] = []
@@ -91,6 +95,11 @@ class Backlog:
                 self._turns.remove(row)
         self._count -= len(dropped)
         return dropped
+
+
+def moved(messages: Iterable[Message], by_ns: int) -> Iterator[Message]:
+    """Yield these messages as if they had arrived later, or earlier if `by_ns` is negative."""
+    return ((row, payload, encoding, arrival_ns + by_ns) for row, payload, encoding, arrival_ns in messages)
 
 
 def most_of_a_row(messages: Iterable[Message]) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 
 from dropanchor_schemas.wire import COUNTS_AT, ENCODING_PACKED, HEADER
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.ingest.backlog import MESSAGE_OVERHEAD, PAYLOAD, ROW, Backlog, Message, most_of_a_row
+from dropanchor_service.ingest.backlog import MESSAGE_OVERHEAD, PAYLOAD, ROW, Backlog, Message, most_of_a_row, moved
 from dropanchor_service.ingest.fair_share import fair_cap, sizes_from_newest
 from dropanchor_service.ingest.overload import Overload
 
@@ -94,6 +94,15 @@ class MessageBuffer:
     def admit(self, key: str, row: int) -> None:
         """Register a key: its messages belong to `row` from now on."""
         self._rows[key] = row
+
+    def move_arrivals(self, by_ns: int) -> None:
+        """Follow the clock that tells arrivals, which was moved. Messages have not waited for longer."""
+        with self._lock:
+            self._messages = list(moved(self._messages, by_ns))
+            self._unregistered = deque((*message[:3], message[3] + by_ns) for message in self._unregistered)
+            self._backlog.move_arrivals(by_ns)
+            self._overload.end()
+            self._of_single_tags.end()
 
     def forget(self, key: str) -> None:
         """Treat the messages of a key as those of an unregistered tag from now on."""

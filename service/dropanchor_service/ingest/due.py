@@ -1,4 +1,4 @@
-"""Say until when messages that wait for missing ones have waited long enough."""
+"""Say until when messages that wait for missing ones have waited long enough, and which of those due go together."""
 
 from collections.abc import Collection
 
@@ -7,6 +7,7 @@ import numpy as np
 from dropanchor_schemas.wire import MAX_T_NS
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.messages import Messages
+from dropanchor_service.store.rings import rank_in_row
 
 PENDING_OF_TAG = 32  # messages; a tag with more gives up on what is missing, since all tags wait for its next batches
 
@@ -26,3 +27,12 @@ def due_of_each(due_ns: int, window_ns: int, messages: Messages, behind: Collect
     due: Array = np.where(is_behind, np.minimum(newest[rows] - window_ns, due_ns), due_ns)
     due[np.bincount(rows[:waited], minlength=len(newest))[rows] > PENDING_OF_TAG] = MAX_T_NS
     return due
+
+
+def one_per_row(due: Array, of_row: Array) -> list[Array]:
+    """Split the indices `due` into parts that hold each row at most once, in the order of each row."""
+    rows = of_row[due]
+    if len(set(rows.tolist())) == len(rows):  # as nearly always
+        return [due] if len(due) else []
+    ranks = rank_in_row(rows)
+    return [due[ranks == rank] for rank in range(int(ranks.max(initial=-1)) + 1)]

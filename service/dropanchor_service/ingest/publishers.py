@@ -7,9 +7,11 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import Array, SampleBatch
 from dropanchor_service.ingest.clock_offsets import offsets_of
+from dropanchor_service.ingest.corrections import differences, errors, follow_lag, move
 from dropanchor_service.ingest.kernels import sequences
 from dropanchor_service.ingest.kernels.clocks import TAG_TIME, time_offsets
 from dropanchor_service.ingest.kernels.sequences import PER_TAG, PUBLISHER, WINDOW
+from dropanchor_service.ingest.kernels.utc_clocks import DOUBTED_NS, WATCH
 from dropanchor_service.ingest.kernels.values import newest_times
 from dropanchor_service.ingest.messages import Messages
 from dropanchor_service.ingest.motion_offsets.watch import MotionOffsets
@@ -40,12 +42,16 @@ class TimeOffsets(NamedTuple):
     """What to add to the times of messages, ns; an array is empty if all of it is 0. motion: to those of IMU samples.
 
     jumps: how many clocks jumped. restarts: indices of messages from which on the motion is of an earlier time.
+    doubted: indices in `Publishers.columns` of publishers that show that their clock, or that of the host, is off.
+    doubtful: indices of messages whose clock was set, or that begin a backlog; see `is_doubtful`.
     """
 
     messages: Array
     motion: Array
     jumps: int
     restarts: Array
+    doubted: Array
+    doubtful: Array
 
 
 class SequenceState(NamedTuple):
@@ -75,6 +81,8 @@ class Publishers:
     def __init__(self) -> None:
         self._columns = np.zeros(0, PUBLISHER)
         self._times = np.zeros(0, TAG_TIME)
+        self.watches = np.zeros(0, WATCH)  # of each publisher
+        self.estimated = np.zeros(0, np.int64)  # newest of the estimator's times of each tag; 0: none yet
         self._motion_offsets = MotionOffsets()
         self._watched_ns = 0
 
@@ -86,6 +94,8 @@ class Publishers:
     @columns.setter
     def columns(self, columns: Array) -> None:
         self._columns = columns.copy()
+        self.watches = np.zeros(len(columns), WATCH)
+        self.estimated = np.zeros(len(columns) // PER_TAG, np.int64)
 
     @property
     def times(self) -> Array:
@@ -137,7 +147,7 @@ class Publishers:
         self._columns["gap_allowed"].reshape(-1, PER_TAG)[known] = True
 
     def time_offsets(
-        self, messages: Messages, sequenced: Sequenced, samples: Sequence[tuple[Array, Array]]
+        self, messages: Messages, sequenced: Sequenced, samples: Sequence[tuple[Array, Array]], now_ns: int
     ) -> TimeOffsets:
         """Return the estimator's time minus the publisher's clock for each message.
 
@@ -145,17 +155,30 @@ class Publishers:
         """
         forms, n = messages.read.forms, len(messages.rows)
         newest, counts = np.full((n, 3), -1, np.int64), np.zeros((n, 3), np.int64)
-        offsets, motion, restarts = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, bool)
+        offsets, motion = np.zeros(n, np.int64), np.zeros(n, np.int64)
+        restarts, doubted, doubtful = np.zeros((3, n), bool)
         for kind, (indices, t_ns) in enumerate(samples):
             if len(t_ns):
                 newest_times(t_ns, indices, kind, newest, counts)
         jumps = time_offsets(
             *(forms, sequenced.slots, newest, counts, messages.arrived, sequenced.due, self._columns, self._times),
-            *(offsets, motion, restarts),
+            *(self.watches, self.estimated, now_ns, offsets, motion, restarts, doubted, doubtful),
         )
         used = offsets if offsets.any() else _NONE
         of_motion = offsets + motion if motion.any() else used
-        return TimeOffsets(used, of_motion, jumps, np.flatnonzero(restarts) if restarts.any() else _NONE)
+        went_back, in_doubt = (np.flatnonzero(some) if some.any() else _NONE for some in (restarts, doubtful))
+        of_doubted = sequenced.slots[doubted] if doubted.any() else _NONE
+        return TimeOffsets(used, of_motion, jumps, went_back, of_doubted, in_doubt)
+
+    def is_doubtful(self, slot: int) -> bool:
+        """Return whether it is not known yet that the clock of a publisher was set, or that it sends a backlog."""
+        watch, arrival_ns = self.watches[slot], self._columns["arrival_ns"][slot]
+        sends_backlogs = watch["doubted_ns"] != 0 and arrival_ns - watch["doubted_ns"] < DOUBTED_NS
+        return bool(watch["back_ns"] != 0 and not sends_backlogs)
+
+    def offset_ns(self, slot: int) -> int:
+        """Return the estimator's time minus the clock of a publisher, ns."""
+        return int(self._columns["shift_ns"][slot] - self._times["correction_ns"][slot // PER_TAG])
 
     def compare_clocks(self, samples: SampleBatch, now_ns: int) -> None:
         """Use the samples of tags whose motion and ranges come from two publishers to compare their clocks."""
@@ -181,6 +204,25 @@ class Publishers:
             for row, offset_s, spread_s, corrected in zip(*(column.tolist() for column in columns), strict=True)
         }
 
+    def differences(self, now_ns: int) -> dict[int, int]:
+        """Return, by row, by how much our clock is ahead of that of a tag, ns. Tags that are not live are left out."""
+        return differences(self._columns, self.watches, now_ns)
+
+    def clock_errors(self, now_ns: int) -> dict[int, float]:
+        """Return, by row, how far the clock of a tag is ahead of ours, s, where that is corrected."""
+        return errors(self._columns, now_ns)
+
+    def follow_lags(self, slots: Array) -> None:
+        """Correct the times of these publishers, if they are always late by the same."""
+        for slot in slots.tolist():
+            follow_lag(slot, self._columns, self._times, self.watches, self.estimated)
+
+    def move(self, by_ns: int) -> None:
+        """Follow our clock, which was moved, so that the times of the estimators go on."""
+        self._watched_ns += by_ns
+        move(self._columns, self._times, by_ns)
+        self.watches[:] = 0
+
     def to_utc(self, outcomes: Array) -> None:
         """Convert the times of POSE or INNOVATION from the estimators' time to UTC, in place."""
         if self._times["correction_ns"].any():
@@ -192,3 +234,5 @@ class Publishers:
         if needed > len(self._columns):
             self._columns = enlarged(self._columns, max(needed, 2 * len(self._columns)))
             self._times = enlarged(self._times, len(self._columns) // PER_TAG)
+            self.watches = enlarged(self.watches, len(self._columns))
+            self.estimated = enlarged(self.estimated, len(self._times))

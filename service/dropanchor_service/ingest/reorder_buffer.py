@@ -1,6 +1,6 @@
 """Keep messages that wait for one numbered before them."""
 
-from dropanchor_service.ingest.backlog import Message
+from dropanchor_service.ingest.backlog import Message, moved
 
 
 class ReorderBuffer:
@@ -26,6 +26,10 @@ class ReorderBuffer:
         """Add messages, the oldest first."""
         self._messages += messages
         self._bytes += sum(len(message[1]) for message in messages)
+
+    def move_arrivals(self, by_ns: int) -> None:
+        """Follow the service's clock, which was moved."""
+        self._messages = list(moved(self._messages, by_ns))
 
     def take_due(self, others: list[Message], due_ns: int) -> list[Message]:
         """Take out all messages of the rows that have a message in `others`, or one that arrived by `due_ns`.

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import starmap
 from operator import is_
 
 import numpy as np
@@ -12,8 +13,10 @@ from dropanchor_service.estimation.columns import Array, SampleBatch
 from dropanchor_service.ingest.backlog import ARRIVAL, Message
 from dropanchor_service.ingest.batch import Batch, Spans, engine_columns, spans_of, times_of
 from dropanchor_service.ingest.decode import Forms, read_forms, read_samples
-from dropanchor_service.ingest.due import due_of_each
+from dropanchor_service.ingest.doubtful import Doubtful
+from dropanchor_service.ingest.due import due_of_each, one_per_row
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
+from dropanchor_service.ingest.host_clock import HostClock
 from dropanchor_service.ingest.kernels.arrivals import record_arrivals
 from dropanchor_service.ingest.messages import Messages
 from dropanchor_service.ingest.publishers import Publishers, Sequenced
@@ -22,7 +25,6 @@ from dropanchor_service.ingest.reorder_buffer import ReorderBuffer
 from dropanchor_service.ingest.screening import absurd_imu, keep, screen
 from dropanchor_service.ingest.times import in_time
 from dropanchor_service.store import Sites
-from dropanchor_service.store.rings import rank_in_row
 from dropanchor_service.store.rows import MESSAGE
 
 REORDER_BYTES = 2**26
@@ -58,22 +60,29 @@ class SampleReader:
         engine: GuardedEngine,
         rejections: Rejections,
         publishers: Publishers,
+        host: HostClock,
         window_ns: int,
     ) -> None:
         self.window_ns = window_ns
         self.span_ns = 0
         self.on_gap: OnGap = lambda *_: False
         self._publishers = publishers
+        self._host = host
         self._sites = sites
         self._rows = sites.rows
         self._engine = engine
         self._rejections = rejections
+        self._doubtful = Doubtful(publishers)
         self._reorder = ReorderBuffer(REORDER_BYTES)
 
     @property
     def pending(self) -> int:
         """Number of messages that wait for one numbered before them."""
         return len(self._reorder)
+
+    def move_arrivals(self, by_ns: int) -> None:
+        """Follow the service's clock, which was moved."""
+        self._reorder.move_arrivals(by_ns)
 
     def put_in_order(self, fresh: list[Message], now_ns: int, behind: Collection[int] = ()) -> Ordered:
         """Find the messages that are due, fresh or pending, and let the others wait. behind: see `due_of_each`."""
@@ -124,10 +133,10 @@ class SampleReader:
         A batch holds at most one message of each tag, so that the result for a message does not depend on which others
         arrived with it.
         """
-        for due in _one_per_row(ordered.sequenced.due, ordered.messages.rows):
+        for due in one_per_row(ordered.sequenced.due, ordered.messages.rows):
             sent = read_samples(ordered.messages.read, due)
             batch = Batch(ordered.messages, ordered.sequenced._replace(due=due), sent, [])
-            yield self._of_engine(self._on_one_clock(self._screened(batch)))
+            yield from map(self._of_engine, self._on_one_clock(self._screened(batch)))
 
     def _screened(self, batch: Batch) -> Batch:
         """Return the batch in our units, with values that sensors can have measured."""
@@ -152,13 +161,30 @@ class SampleReader:
         rows, values = batch.rows_of(low).tolist(), low["value"].tolist()
         self._rows.low_pressures.update(zip(rows, values, strict=True))
 
-    def _on_one_clock(self, batch: Batch) -> Batch:
-        """Return the batch with the estimator's times, and restart the rows whose clock went back."""
-        offsets = self._publishers.time_offsets(batch.messages, batch.sequenced, times_of(batch.samples))
+    def _on_one_clock(self, batch: Batch) -> Iterator[Batch]:
+        """Yield the batch with the estimator's times, behind messages that were doubtful before.
+
+        Rows whose motion went back are restarted.
+        """
+        arrived, slots = batch.messages.arrived, batch.sequenced.slots
+        if not self._host.is_settled:
+            newest_ns, due = spans_of(batch).newest, batch.sequenced.due
+            timed = due[(slots[due] >= 0) & (newest_ns[due] >= 0)]
+            arrived += self._host.settle(slots[timed], newest_ns[timed], arrived[timed])
+        times = times_of(batch.samples)
+        offsets = self._publishers.time_offsets(batch.messages, batch.sequenced, times, self._host.now_ns())
+        arrived += self._host.look(offsets.doubted)
         self._rejections.count_clock_jumps(offsets.jumps)
         for row in batch.messages.rows[offsets.restarts].tolist():
             self._engine.restart(row)
-        timed, early = in_time(batch, offsets)
+        if len(offsets.doubtful):
+            batch = self._doubtful.split(batch, offsets.doubtful)
+        yield from starmap(self._in_time, self._doubtful.take_decided())
+        yield self._in_time(batch, offsets.messages, offsets.motion)
+
+    def _in_time(self, batch: Batch, offsets: Array, of_motion: Array) -> Batch:
+        """Return the batch with the estimator's times, and record times that cannot be."""
+        timed, early = in_time(batch, offsets, of_motion)
         for samples in early:
             samples.record(self._rows, batch.messages)
         return timed
@@ -269,12 +295,3 @@ def _if_readable(payload: bytes, encoding: str) -> bytes:
     except Exception:
         return b""
     return payload
-
-
-def _one_per_row(due: Array, of_row: Array) -> list[Array]:
-    """Split the indices `due` into parts that hold each row at most once, in the order of each row."""
-    rows = of_row[due]
-    if len(set(rows.tolist())) == len(rows):  # as nearly always
-        return [due] if len(due) else []
-    ranks = rank_in_row(rows)
-    return [due[ranks == rank] for rank in range(int(ranks.max(initial=-1)) + 1)]

@@ -11,7 +11,6 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.batch import Batch, times_of
 from dropanchor_service.ingest.kernels.values import shift_times
 from dropanchor_service.ingest.messages import Messages
-from dropanchor_service.ingest.publishers import TimeOffsets
 from dropanchor_service.ingest.screening import keep, within_time
 from dropanchor_service.store import Rows
 
@@ -30,10 +29,13 @@ class Early(NamedTuple):
             rows.wrong_times.record(row, rows.at(row).name, sent_ns, int(messages.arrived[message]))
 
 
-def in_time(batch: Batch, offsets: TimeOffsets) -> tuple[Batch, list[Early]]:
-    """Add the offset of its message to the time of each sample, and reject samples whose time then cannot be UTC."""
+def in_time(batch: Batch, offsets: Array, of_motion: Array) -> tuple[Batch, list[Early]]:
+    """Add the offset of its message to the time of each sample, and reject samples whose time then cannot be UTC.
+
+    offsets, of_motion: ns, of each message; empty for none. That of motion holds for IMU samples.
+    """
     times = times_of(batch.samples)
-    of_kinds = [offsets.motion, *[offsets.messages] * (len(times) - 1)]
+    of_kinds = [of_motion, *[offsets] * (len(times) - 1)]
     both = zip(times, of_kinds, strict=True)
     if not sum(shift_times(t_ns, messages, added_ns) for (messages, t_ns), added_ns in both if len(t_ns)):
         return batch, []

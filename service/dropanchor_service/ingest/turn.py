@@ -16,6 +16,7 @@ from dropanchor_service.ingest.backlog import ROW, Message
 from dropanchor_service.ingest.buffer import MessageBuffer, UnregisteredMessage
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.health import HealthIntake
+from dropanchor_service.ingest.host_clock import HostClock
 from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.rejections import Rejections
@@ -49,7 +50,8 @@ class Ingest:
     ) -> None:
         self._rejections = Rejections(sites.rows, metrics)
         self.health = HealthIntake(admission, sites, self._rejections, buffer.wake)
-        self._reader = SampleReader(sites, engine, self._rejections, publishers, reorder_ns)
+        host = HostClock(clock, publishers, sites.rows, self._follow_clock)
+        self._reader = SampleReader(sites, engine, self._rejections, publishers, host, reorder_ns)
         self._buffer = buffer
         self._admission = admission
         self._sites = sites
@@ -104,6 +106,15 @@ class Ingest:
             self._note(ordered.taken)
             self._fuse(ordered, now_ns)
         return len(fresh)
+
+    def _follow_clock(self, by_ns: int) -> None:
+        """Follow the service's clock, which was moved: nothing has waited for longer, and no pose is of the future."""
+        self._buffer.move_arrivals(by_ns)
+        self._reader.move_arrivals(by_ns)
+        self._rows.arrivals.forget()
+        if by_ns < 0:
+            self._latest.move_future(self._clock.now_ns(), by_ns)
+        self._metrics.host_clock.set(-self._clock.correction_ns * 1e-9)
 
     def _note(self, messages: list[Message]) -> None:
         """Count messages and show them to the observers."""

@@ -75,7 +75,12 @@ class Metrics:
             "dropanchor_pose_delay_seconds",
             "Time from the arrival of the oldest message of a batch until its poses are in the store.",
         )
-        self.clock_jumps = self._counter("dropanchor_clock_jumps", "Tag clocks that were set while they ran.")
+        self.clock_jumps = self._counter("dropanchor_clock_jumps", "Tag clocks that were set, or found to be off.")
+        self.host_clock = Gauge(
+            "dropanchor_host_clock_error_seconds",
+            "How far the clock of this machine is ahead of that of its tags; 0 while they agree.",
+            registry=self.registry,
+        )
 
     def _add_checkpoints(self) -> None:
         self.checkpoints = Counter(

@@ -51,6 +51,11 @@ class Arrivals:
         found: Array = self.are_conspicuous[rows]
         return found
 
+    def forget(self) -> None:
+        """Learn how samples arrive anew, because the clock that tells arrivals was moved."""
+        self.columns[:] = 0
+        self.are_conspicuous[:] = False
+
     def grow(self, rows: int) -> None:
         """Make room for this many rows."""
         if rows > len(self.columns):

@@ -65,6 +65,15 @@ class LatestPoses:
                 self._innovations.write(innovations)
         self._tell()
 
+    def move_future(self, now_ns: int, by_ns: int) -> None:
+        """Move the poses that lie in the future, because the clock that told them was moved."""
+        with self._lock:
+            future = self._poses["t_ns"] > now_ns
+            self._poses["t_ns"][future] += by_ns
+            self._version += 1
+            self._changed[future & (self._changed > 0)] = self._version
+        self._tell()
+
     def forget(self, row: int) -> None:
         """Remove the pose of a row until the next one is written."""
         with self._lock:

@@ -1,7 +1,7 @@
 """The columns of all tags of all sites: a row for each tag, with its counters and what is known about its samples."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from threading import Lock
 
@@ -106,6 +106,7 @@ class Rows:
         self.norths = Norths()
         self.start_news = StartNewsQueue()
         self.wrong_times = WrongTimes()
+        self.clock_errors: Mapping[int, float] = {}  # by row: how far a clock that is off is ahead of UTC, s
         self.low_pressures: dict[int, float] = {}  # by row: the last one below what a barometer shows in Pa, as sent
         self.recent = Recent(COUNTS)
         self.online_until = OnlineUntil()

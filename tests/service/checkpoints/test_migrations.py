@@ -29,7 +29,7 @@ def reloaded(folder: Path, whole: bytes) -> Drive:
     (folder / "checkpoints" / "checkpoint-000000000007").write_bytes(whole)
     drive = Drive(folder)
     kept = CheckpointFolder(folder / "checkpoints", drive.state.layout, drive.state.decoded)
-    CheckpointThread(drive.state, kept, drive.bench.metrics, 1.0).load()
+    CheckpointThread(drive.state, kept, drive.bench.metrics, 1.0, drive.bench.clock).load()
     return drive
 
 

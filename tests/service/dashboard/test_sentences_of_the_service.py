@@ -14,7 +14,7 @@ from dropanchor_schemas.rejections import Reason
 from dropanchor_schemas.sentences import Sentence, phrase_of, said_by, say, with_stop
 from dropanchor_schemas.zones import Circle, Polygon
 from dropanchor_service.answers import hints, unused
-from dropanchor_service.answers.care import care_of
+from dropanchor_service.answers.care import care_of, wrong_clock
 from dropanchor_service.answers.columns import REASONS
 from dropanchor_service.api.http.closing import reason_of
 from dropanchor_service.api.http.errors import message_of
@@ -30,6 +30,7 @@ from dropanchor_service.history.sqlite import store as of_history
 from dropanchor_service.node import sentences as of_node
 from dropanchor_service.node.owners import Owner
 from dropanchor_service.plans import images as of_images
+from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.kernel_cache import VARIABLE
 from dropanchor_service.runtime.recovery import BEGINS_EMPTY, COPY_USED, DAMAGED, Recovery, damaged, unreadable
 from dropanchor_service.security import share_links as of_links
@@ -74,6 +75,14 @@ def hints_of_care() -> Iterator[str]:
     ):
         for age_s in (400, 9000):
             yield from (care["hint"] for care in care_of(tag, health, int(age_s * 1e9), offset))
+
+
+def clocks() -> Iterator[str]:
+    for error_s in (3.0, -300.0, 18_000.0, -2_592_000.0):
+        yield wrong_clock(error_s)
+        host = UtcClock()
+        host.step(round(error_s * 1e9))
+        yield host.problem or ""
 
 
 def refused_shapes() -> Iterator[str]:
@@ -138,7 +147,7 @@ def progress() -> Iterator[str]:
 
 def every_hint(tmp_path: Path) -> list[str]:
     of_processes = {*sentences_of_a_cluster(), *sentences_of_a_node(), *progress(), *damage(tmp_path)}
-    return sorted({*hints_of_poses(), *hints_of_care(), *refused_shapes(), *of_processes})
+    return sorted({*hints_of_poses(), *hints_of_care(), *clocks(), *refused_shapes(), *of_processes})
 
 
 def test_every_sentence_has_one_code_and_one_text_which_stand_in_the_code() -> None:

@@ -41,7 +41,7 @@ class Tag:
         times = [
             (zero, np.array([true_ns + error_ns])) if kind in kinds else (zero[:0], arrival[:0]) for kind in range(2)
         ]
-        self.publishers.time_offsets(messages, sequenced, times)
+        self.publishers.time_offsets(messages, sequenced, times, true_ns + delay_ns)
 
     def send_apart(self, seconds: float, error_ns: int, begin_s: float = 0.0, **form: bool) -> None:
         """Send motion from a clock with this error, and ranges from one that is right."""

@@ -168,6 +168,7 @@ TAG: dict[str, Any] = {
         "from_motion": {"offset_s": -0.05, "uncertainty_s": 0.25},
         "corrected": False,
     },
+    "clock_error_s": None,
     "needs_care": [{"reason": "battery_low", "hint": "The battery is at 15%: charge it."}],
     "remote_settings": REMOTE_SETTINGS,
     "settings": TAG_SETTINGS,

@@ -14,6 +14,7 @@ _SETTINGS = {Need.LINK_TO_TAGS: _LABELS, Need.LINK: _LABELS | {"height_m"}}
 _HIDDEN: Answer = {
     "health": None,
     "clock_offset": None,
+    "clock_error_s": None,
     "needs_care": [],
     "remote_settings": {"wanted": RemoteSettings().model_dump(), "acknowledged": None},
 }

@@ -240,6 +240,7 @@ def _statuses(
             "unknown_anchor": answers.unknown_anchor_of(tag),
             "health": health_answer(answers.health.of(tag.row), now_ns),
             "clock_offset": None if offset is None else offset.answer(),
+            "clock_error_s": tag.rows.clock_errors.get(tag.row),
             "needs_care": care_of(tag, answers.health, now_ns, offset),
             "remote_settings": remote_answer(answers, tag),
             "settings": configured[tag.name].model_dump() if tag.name in configured else default,

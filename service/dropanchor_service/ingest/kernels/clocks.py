@@ -1,10 +1,11 @@
-"""Map publishers' clocks to our UTC: clocks that count from a start, and UTC clocks that jump.
+"""Map publishers' clocks to our UTC: clocks that count from a start here, clocks that should be UTC in `utc_clocks.py`.
 
 A clock is judged by its publisher's messages in the order of their numbers: the time of the newest sample of each is
-compared with its arrival. Delay alone is no error: the times in a backlog of minutes still advance in order.
+compared with its arrival.
 
-Estimators use the intervals of a boot clock unchanged, whatever the arrivals. The mapping to UTC is corrected all the
-time, but for one boot clock of each tag, its reference, the corrections change only the times of the tag's poses.
+Estimators use the intervals of a clock unchanged, whatever the arrivals. The mapping of a boot clock to UTC is
+corrected all the time, but for one boot clock of each tag, its reference, the corrections change only the times of the
+tag's poses. So it is where we learn that a UTC clock is off, and the clock itself did not jump.
 """
 
 from typing import Any, Final
@@ -15,6 +16,7 @@ from numba import njit
 from dropanchor_schemas.times import EARLIEST_UTC_NS
 from dropanchor_service.ingest.kernels.sensor_clocks import compare, first_shift
 from dropanchor_service.ingest.kernels.sequences import NONE_NS, PER_TAG
+from dropanchor_service.ingest.kernels.utc_clocks import NEAR_NS, sends_backlogs, utc_shift, watch_lag
 
 EPOCH_NS: Final = 30_000_000_000
 DEADBAND_NS: Final = 3_000_000  # smaller errors of a mapping are not corrected: least delays vary by as much
@@ -23,10 +25,8 @@ STEP_NS: Final = 250_000_000  # larger ones are corrected at once; the estimator
 SLOW: Final = 5_000  # correct by 1/SLOW of the time that passes: 200 ppm, while crystals drift by 100 ppm at most
 FAST: Final = 100
 FAST_MAX_NS: Final = 1_000_000  # per message; less than the time between samples, so that their order stays
-BACK_NS: Final = 2_000_000_000  # a clock that goes back farther has been set
+BACK_NS: Final = 2_000_000_000  # a boot clock that goes back farther counts from another start
 DAY_NS: Final = 86_400_000_000_000
-AHEAD_NS: Final = 10_000_000_000  # ahead of our UTC: no sample is from the future
-NEVER_SET_NS: Final = 1_577_836_800_000_000_000  # 2020: an earlier UTC comes from a clock that was never set
 
 TAG_TIME: Final = np.dtype(
     [
@@ -89,20 +89,6 @@ def _slew(error_ns: int, passed_ns: int) -> int:
 
 
 @njit(nogil=True)
-def _shift(publisher: Any, t_ns: int, arrival_ns: int) -> int:
-    """Return the shift, ns, that removes the jumps of a clock that should be UTC; 0 while the clock is right."""
-    if publisher.arrival_ns == 0:
-        return arrival_ns - t_ns if t_ns < NEVER_SET_NS or t_ns > arrival_ns + AHEAD_NS else 0
-    shift = publisher.shift_ns
-    due_ns = publisher.newest_ns + shift + max(arrival_ns - publisher.arrival_ns, 0)
-    if shift != 0 and abs(t_ns - due_ns) <= BACK_NS:
-        return 0  # the clock was set right
-    if t_ns < publisher.newest_ns - BACK_NS or t_ns + shift > arrival_ns + AHEAD_NS:
-        return int(due_ns - t_ns)
-    return int(shift)
-
-
-@njit(nogil=True)
 def _is_reference(time: Any, publishers: Any, slot: int, arrival_ns: int) -> bool:
     """Return whether this publisher is the tag's reference. One that has been silent for a minute is replaced."""
     first = slot - slot % PER_TAG
@@ -147,8 +133,22 @@ def _move(publisher: Any, newest_ns: int, boot_clock: bool, back: bool) -> None:
         publisher.least_ns -= moved_ns
     if publisher.previous_least_ns != NONE_NS:
         publisher.previous_least_ns -= moved_ns
-    if abs(newest_ns - publisher.arrival_ns) <= AHEAD_NS:
+    if abs(newest_ns - publisher.arrival_ns) <= NEAR_NS:
         publisher.shift_ns = 0  # what looked like a jump was the motion
+
+
+@njit(nogil=True)
+def _change_shift(publisher: Any, watch: Any, time: Any, t_ns: int, change_ns: int, newest_ns: int) -> None:
+    """Note that the shift of a UTC clock changes.
+
+    If the estimator's time goes on only that way, what changes is its UTC. Else the clock has jumped, and the shift
+    removes the jump. newest_ns: of the estimator's times so far.
+    """
+    publisher.least_ns, publisher.epoch_end_ns = NONE_NS, 0  # differences of another clock, in effect
+    watch.begun_ns = 0
+    before_ns = t_ns + publisher.shift_ns - time.correction_ns
+    if publisher.arrival_ns != 0 and abs(before_ns - newest_ns) < abs(before_ns + change_ns - newest_ns):
+        time.correction_ns += change_ns
 
 
 @njit(cache=True, nogil=True)
@@ -161,48 +161,62 @@ def time_offsets(
     chosen: Any,
     publishers: Any,
     times: Any,
+    watches: Any,
+    estimated: Any,
+    now_ns: int,
     offsets: Any,
     motion: Any,
     restarts: Any,
+    doubted: Any,
+    doubtful: Any,
 ) -> int:
     """Fill `offsets` with the estimator's time minus the publisher's clock, ns. Return how many clocks jumped.
 
     chosen: indices of the messages, in the order of their publishers. newest: (n, 3), time of each message's newest
     motion, range and other sample, ns, negative for none. counts: (n, 3), of these samples. slots: its publisher, -1
-    for none. times: TAG_TIME of each row. motion: filled with what to add to the times of motion besides. restarts: set
-    where the motion goes back in time, which an estimator does not see: the motion that it left out is missing.
+    for none. times: TAG_TIME of each row. watches: WATCH of each publisher. estimated: newest of the estimator's times
+    of each row, 0: none yet. motion: filled with what to add to the times of motion besides. restarts: set where the
+    motion goes back in time, which an estimator does not see: the motion that it left out is missing. doubted: set
+    where the clock of a publisher or of the host is off. doubtful: set where a clock was set, or a backlog begins.
     """
     jumps = 0
     for i in chosen:
         t_ns = max(newest[i, 0], newest[i, 1], newest[i, 2])
         if slots[i] < 0 or t_ns < 0:
             continue
-        publisher, time = publishers[slots[i]], times[slots[i] // PER_TAG]
+        row = slots[i] // PER_TAG
+        publisher, time, watch = publishers[slots[i]], times[row], watches[slots[i]]
         if _is_no_utc(forms[i], publisher, t_ns, arrivals[i]):
             continue
         publisher.kinds |= forms[i].kinds
-        if publisher.arrival_ns == 0 and not forms[i].boot_clock and not forms[i].replay:
+        is_first = publisher.arrival_ns == 0
+        if is_first and not forms[i].boot_clock and not forms[i].replay:
             publisher.motion_shift_ns = first_shift(newest[i], arrivals[i])
         t_ns = _newest(newest[i], publisher.motion_shift_ns)
         if forms[i].boot_clock:
             utc = _since_start(publisher, t_ns, arrivals[i])
-            known, change = publisher.arrival_ns != 0, utc - publisher.shift_ns
-            jumps += known and abs(change) > STEP_NS
-            if _is_reference(time, publishers, slots[i], arrivals[i]) and known and abs(change) <= STEP_NS:
+            change = utc - publisher.shift_ns
+            jumps += not is_first and abs(change) > STEP_NS
+            if _is_reference(time, publishers, slots[i], arrivals[i]) and not is_first and abs(change) <= STEP_NS:
                 time.correction_ns += change
         else:
-            utc = _shift(publisher, t_ns, arrivals[i])
-            if utc != publisher.shift_ns:
+            utc = utc_shift(publishers, slots[i], watch, t_ns, arrivals[i], now_ns, forms[i].replay)
+            change = utc - publisher.shift_ns
+            if change != 0:
                 jumps += 1
-                publisher.least_ns, publisher.epoch_end_ns = NONE_NS, 0  # differences of another clock, in effect
+                _change_shift(publisher, watch, time, t_ns, change, estimated[row])
             if not forms[i].replay:
                 _note_difference(publisher, arrivals[i] - t_ns, arrivals[i])
+                doubtful[i] = watch.back_ns != 0 and not sends_backlogs(watch, arrivals[i])
+                doubted[i] = watch_lag(watch, arrivals[i] - t_ns, utc, arrivals[i], now_ns) or (change != 0 and utc < 0)
         offsets[i], motion[i] = utc - time.correction_ns, publisher.motion_shift_ns
         publisher.shift_ns, publisher.newest_ns, publisher.arrival_ns = utc, t_ns, arrivals[i]
         if not forms[i].replay and compare(publishers, slots[i], newest[i], counts[i], arrivals[i]):
             restarts[i] = publisher.motion_shift_ns - motion[i] < -STEP_NS
             _move(publisher, _newest(newest[i], publisher.motion_shift_ns), forms[i].boot_clock, restarts[i])
+            watch.begun_ns = watch.back_ns = 0
             offsets[i], motion[i] = publisher.shift_ns - time.correction_ns, publisher.motion_shift_ns
+        estimated[row] = max(estimated[row], publisher.newest_ns + offsets[i])
     return jumps
 
 
