@@ -18,10 +18,10 @@ from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.attitude import TAU, Attitude, up_in_body
 from dropanchor_service.estimation.fleet.frontend.gait import (
+    FULL_SWING,
     GAIT,
     MAX_INTERVAL,
-    MIN_SWING,
-    REGULAR_STEPS,
+    WALK,
     add_step_sample,
     start_gait,
     step_speed,
@@ -107,7 +107,7 @@ def tilt_tau(c: Carrying, roughness: float) -> float:
 def decide_motion(c: Carrying, q: Array, yaw: float) -> None:
     """Set whether the tag is carried, from the setting or from its steps. yaw: azimuth of body x, rad."""
     if c.carried == 0:
-        if c.motion == CARRIED or (c.motion == AUTO and c.gait.regular >= REGULAR_STEPS):
+        if c.motion == CARRIED or (c.motion == AUTO and c.gait.regular >= WALK):
             c.carried, c.share, c.shift, c.turn, c.rate = 1, 1.0, 0.0, 0.0, 0.0
             refer_up(c, q)
             c.shift = wrap(yaw - carried_yaw(c, q))
@@ -159,7 +159,7 @@ def fill_carried_node(c: Carrying, yaw: float, acc_var: float, node: Node) -> No
     """Fill what the node of a carried tag has beside its yaw, rad. acc_var: that of `standstill`."""
     node.carried = c.carried
     node.walked = c.gait.walked
-    node.stepping = 1 if c.gait.regular > 0 or _sets_off(c) else 0
+    node.stepping = 1 if c.gait.regular >= FULL_SWING or _sets_off(c) else 0
     if c.carried == 0:
         return
     node.dv_var = math.inf
@@ -172,7 +172,7 @@ def fill_carried_node(c: Carrying, yaw: float, acc_var: float, node: Node) -> No
     if c.since_speed_s >= SPEED_EVERY and walks:
         node.step_speed = step_speed(c.gait)
         c.since_speed_s = 0.0
-    if c.since_direction_s >= DIRECTION_EVERY and walks and c.gait.regular >= REGULAR_STEPS:
+    if c.since_direction_s >= DIRECTION_EVERY and walks and c.gait.regular >= WALK:
         azimuth, coherence = stride_direction(c.stride)
         if coherence > LEAST_COHERENCE and abs(c.rate) < STEADY_RATE:
             node.gait_angle, node.gait_coherence = wrap(azimuth - yaw), coherence
@@ -186,7 +186,7 @@ def _sets_off(c: Carrying) -> bool:
     if g.walked == 0.0:
         return bool(g.falling == 0 and g.peak - g.trough > RISING and c.since_rest_s < SET_OFF)
     stepped = g.swing > FIRST_SWING and g.since_step_s < SECOND_STEP
-    walked_s = g.walked / SLOW_WALK if g.swing > MIN_SWING else 0.0
+    walked_s = g.walked / SLOW_WALK if g.swing > FULL_SWING else 0.0
     return bool(stepped and c.since_rest_s < SET_OFF + walked_s + g.since_step_s)
 
 
