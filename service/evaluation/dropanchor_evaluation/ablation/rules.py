@@ -62,7 +62,7 @@ RULES: Final = (
     Rule(
         "birth: any in the other direction",
         "forklift/*/*/*",
-        births=("ahead-while-slow", "back-while-slow", "turned-after-stop", "pushed-back"),
+        births=("ahead-while-slow", "turned-after-stop", "pushed-back"),
     ),
     Rule(
         "birth: any without a line of sight",

@@ -10,7 +10,9 @@ A wrong mounting angle makes a ramp of the speed leak into l, which the ranges s
 time. A turn compares the speed with the centripetal acceleration.
 
 On a rigid mount that nobody told, l also weighs the hypotheses: they have different mounting angles, and l tells these
-apart before the ranges do. Where the angle is told, they differ by what the biases hide, and l weighs none.
+apart before the ranges do. Where the angle is told, they differ by what the biases hide, and l weighs none. Its noise
+grows with the speed, by a slip that most mounts do not have. So the weight has the variance S over that noise: S alone
+would make a hypothesis the likelier, the slower it is, and with every node.
 """
 
 import math
@@ -97,8 +99,8 @@ def update_lateral(one: Hypothesis, scratch: Scratch, node: Node, row: Row, slip
     """
     s = one.mean
     e = -lateral_residual(s, node, scratch.H)
-    S = project(one.cov, scratch.H, scratch.PH) + lateral_variance(s, node, row, slip_std)
-    S = max(S, e * e / BOUND**2)
+    noise = lateral_variance(s, node, row, slip_std)
+    S = max(project(one.cov, scratch.H, scratch.PH) + noise, e * e / BOUND**2)
     if power > 0.0:
-        one.log_weight -= 0.5 * power * (math.log(S) + e * e / S)
+        one.log_weight -= 0.5 * power * (math.log(S / noise) + e * e / S)
     update_pda(s, one.cov, scratch.PH, S, e, 1.0)

@@ -1,6 +1,7 @@
-"""In which direction a tag drives along its course: one that stops, slows down or is pushed back may turn back.
+"""In which direction a tag drives along its course: one that stops or is pushed back may turn back.
 
-At rest there is no direction. Only an accelerometer tells the two apart soon enough.
+At rest there is no direction. Only an accelerometer tells the two apart soon enough. One that is merely slow turns back
+in no hypothesis: past the anchor that would be a mirror image, which ranges and a bias of the accelerometer explain.
 """
 
 import math
@@ -9,7 +10,6 @@ from typing import Final
 from dropanchor_service.estimation.fleet.belief.births.numbers import (
     PUSHED_BACK,
     SLOW_AHEAD,
-    SLOW_BACK,
     TURN_AFTER_STOP,
 )
 from dropanchor_service.estimation.fleet.belief.layout import Hypotheses, Hypothesis, Row, V
@@ -44,8 +44,6 @@ def admits(kind: int, one: Hypothesis, row: Row, t: Tuning) -> bool:
         return False
     if kind == SLOW_AHEAD:
         return may_drive_ahead(one)
-    if kind == SLOW_BACK:
-        return may_drive_back(one, row, t)
     return kind == TURN_AFTER_STOP or is_pushed_back(one, t)
 
 
@@ -54,9 +52,8 @@ def make(kind: int, work: Hypotheses, source: int, target: int, row: Row) -> Non
     """Copy `source` for the other direction. One that slowed down waits before it may turn back again."""
     copy_hypothesis(work, source, target)
     work[target].reverse = 1 - work[source].reverse
-    if kind in (SLOW_AHEAD, SLOW_BACK):
-        row.since_turnabout_s = 0.0
     if kind == SLOW_AHEAD:
+        row.since_turnabout_s = 0.0
         work[source].log_weight += EVEN
 
 
@@ -97,14 +94,6 @@ def may_drive_ahead(one: Hypothesis) -> bool:
 def may_reverse(row: Row, t: Tuning) -> bool:
     """Return whether a tag moves backwards as easily as ahead: it is told to, or it may be mounted backwards."""
     return bool(row.settings.reverse_allowed == 1 or is_mount_untold(row, t))
-
-
-@njit(nogil=True)
-def may_drive_back(one: Hypothesis, row: Row, t: Tuning) -> bool:
-    """Return whether a hypothesis that drives ahead has slowed down, where the tag may reverse."""
-    if one.reverse == 1 or not may_reverse(row, t):
-        return False
-    return bool(one.mean[V] < max(SLOW / 2, math.sqrt(one.cov[V, V])))
 
 
 @njit(nogil=True)

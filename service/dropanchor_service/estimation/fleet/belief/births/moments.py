@@ -18,7 +18,6 @@ from dropanchor_service.estimation.fleet.belief.births.numbers import (
     SIGHT_EXPECTED,
     SIGHT_LOST,
     SLOW_AHEAD,
-    SLOW_BACK,
     SPLIT_CURVED,
     SPLIT_WIDE,
     TURN_AFTER_STOP,
@@ -52,7 +51,7 @@ def before_prediction(work: Hypotheses, count: int, row: Row, node: Node, t: Tun
     count = follow_motion(work, count, row, node, t)
     judge_standstill(work, count, row, node, t)
     wait_to_turn(row, node)
-    count = bear(SLOW_AHEAD, SLOW_BACK, work, count, row, node, t, scratch)
+    count = bear(SLOW_AHEAD, SLOW_AHEAD, work, count, row, node, t, scratch)
     count = bear(TURN_AFTER_STOP, TURN_AFTER_STOP, work, count, row, node, t, scratch)
     follow_rest(work, count, row, node)
     return count
