@@ -6,13 +6,14 @@ when an answer is complete.
 """
 
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
 from threading import Lock
 
 from dropanchor_service.ingest.backlog import Message
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.gaps import Gaps
+from dropanchor_service.ingest.released import Released
 from dropanchor_service.ingest.sequence_states import StatesOf
 from dropanchor_service.ingest.suspended import Number, Suspended, distances, in_order, missing, number_of, size_of
 
@@ -56,6 +57,7 @@ class CatchUp:
         self._gaps = Gaps()
         self._with_gap: set[str] = set()  # keys that are suspended because of a gap
         self._releasing: dict[str, set[Number | None]] = {}  # messages of a key that are on their way to the buffer
+        self._released: defaultdict[str, Released] = defaultdict(Released)
         self._silent: set[str] = set()  # keys whose caches exist, so that an empty answer is none
         self._bytes = 0
 
@@ -105,6 +107,7 @@ class CatchUp:
             if self._first_round or self._buffer.is_overloaded:
                 return False
             self._releasing.get(key, set()).difference_update(message.number for message in suspended)  # they came back
+            self._released[key].forget_from(message.number for message in suspended if message.number)
             if key not in self._suspended:
                 if not self._gaps.is_new(key, numbers):
                     return False
@@ -260,21 +263,31 @@ class CatchUp:
             cached = any(self._cached[key] or self._retries[key] for key in taken.keys() - self._with_gap)
             self._suspended |= {key: [] for key in taken}
             self._releasing |= {key: set() for key in taken}
-        released = [
-            message for key, suspended in taken.items() for message in in_order(suspended, self._states_of(key))
-        ]
+            new = {key: self._not_released(key, suspended) for key, suspended in taken.items()}
+        released = [message for key, suspended in new.items() for message in in_order(suspended, self._states_of(key))]
         released.sort(key=lambda message: message.arrival_ns)
         with self._lock:
             self._note_asked(released)
             for message in released:
                 if message.number:
                     self._releasing[message.key].add(message.number)
+                    self._released[message.key].add(message.number)
         for message in released:
             self._buffer.append(message.key, message.payload, message.encoding, message.arrival_ns, cached)
         with self._lock:
             for key, suspended in taken.items():
                 self._end_release(key, suspended)
         return len(released)
+
+    def _not_released(self, key: str, suspended: list[Suspended]) -> list[Suspended]:
+        """Leave out what is on its way to the estimator already.
+
+        While the estimator is behind, what was fused does not tell, and the caches may be asked again. What came twice
+        could then be so old that its publisher seems to have begun to count again.
+        """
+        released = self._released[key]
+        released.forget_fused(self._states_of(key))
+        return [message for message in suspended if message.number is None or message.number not in released]
 
     def _note_asked(self, released: Iterable[Suspended]) -> None:
         """Remember that the caches have nothing more of what was published before these messages."""

@@ -47,6 +47,22 @@ def test_messages_that_were_fused_before_the_restart_are_left_out() -> None:
     ]
 
 
+def test_what_is_on_its_way_to_the_estimator_is_not_released_again() -> None:
+    states = {A: {1: SequenceState(next=4, seen=0b1111)}}
+    bench = CatchUpBench(states)
+    cached(bench, 4, 5, 6)
+    bench.catch_up.on_first_round_answer(LIMIT)
+    bench.catch_up.on_silent(A)
+    cached(bench, 4, 5, 6, 7, 8)  # the estimator has taken none of them yet, and its caches are asked again
+    bench.catch_up.on_answer(A, LIMIT)
+    assert bench.sequences() == [4, 5, 6, 7, 8]
+    states[A] = {1: SequenceState(next=8, seen=0b10011111)}  # 5 and 6 were shed; 8 is still on its way
+    bench.catch_up.on_silent(A)
+    cached(bench, 4, 5, 6, 7, 8)
+    bench.catch_up.on_answer(A, LIMIT)
+    assert bench.sequences() == [5, 6]
+
+
 def test_messages_from_caches_get_arrivals_with_the_delay_of_the_newest() -> None:
     bench = CatchUpBench()
     live(bench, 5, delay_ns=30_000_000)
