@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from support.patience import PATIENCE_S
 from support.secured import secured_site
 from support.service import Running, command, environment, running_service
 from support.zenoh_router import free_endpoint, wait_until
@@ -71,11 +72,11 @@ def test_a_service_whose_terminal_closes_ends_with_a_last_checkpoint(tmp_path: P
     )
     os.close(theirs)
     try:
-        wait_until(lambda: "ready at" in (tmp_path / "log").read_text(), 240.0)
+        wait_until(lambda: "ready at" in (tmp_path / "log").read_text(), 2 * PATIENCE_S)
         process.send_signal(signal.SIGHUP)  # by hand: the terminal is there
         wait_until(lambda: "reloaded" in (tmp_path / "log").read_text())
         os.close(ours)
-        assert process.wait(60.0) == 0
+        assert process.wait(PATIENCE_S) == 0
     finally:
         process.kill()
         process.wait()

@@ -41,6 +41,8 @@ class Interrupt:
         while not self._event.wait(CHECK_S):
             if self._reloads and reload is not None:
                 self._reloads = False
+                if self._lost_terminal():  # it may have gone a moment after the signal
+                    return True
                 reload()
             if not keep_waiting():
                 return self._event.is_set()
@@ -52,10 +54,13 @@ class Interrupt:
 
     def on_hangup(self, number: int, frame: FrameType | None) -> None:
         """Handle SIGHUP."""
-        if self._in_terminal and not _has_terminal():
+        if self._lost_terminal():
             self.on_signal(number, frame)
         else:
             self._reloads = True
+
+    def _lost_terminal(self) -> bool:
+        return self._in_terminal and not _has_terminal()
 
     def on_signal(self, number: int, _frame: FrameType | None) -> None:
         """Handle a signal."""
