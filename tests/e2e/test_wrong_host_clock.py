@@ -15,12 +15,17 @@ HOUR_S = 3600.0
 LIVES_S = (0.0, 5 * HOUR_S, -3 * HOUR_S, 24 * HOUR_S, 0.0)
 TAGS, SEED = 3, 1
 NEAR_S = 1.5
+WRITTEN = 'dropanchor_checkpoints_total{outcome="written"}'
 
 
 def is_named(service: Running, wanted: bool) -> bool:
     """Return whether readiness names the clock of the machine exactly if that is `wanted`."""
     impaired = service.get("/api/v1/health/ready")["impaired"]
     return any("clock of this machine" in one for one in impaired) is wanted
+
+
+def has_written(service: Running, checkpoints: float) -> bool:
+    return service.metric(WRITTEN) >= checkpoints
 
 
 def live_poses(service: Running) -> list[dict[str, Any]]:
@@ -49,4 +54,6 @@ def test_poses_keep_the_time_of_the_tags_whatever_the_clock_of_the_host_shows(tm
                 for status in service.get("/api/v1/tags")["tags"]:
                     assert status["clock_error_s"] is None
                     assert status["needs_care"] == []
+                written = service.metric(WRITTEN)  # with the time that the tags told
+                wait_until(partial(has_written, service, written + 2))
                 service.stop(signal.SIGKILL)
