@@ -75,6 +75,10 @@ NOT_RUN = {
     "run-a-cluster.md: pip install --upgrade 'dropanchor-service[cluster]'": _PIP,
     "run-a-cluster.md: pip install 'dropanchor-service[cluster,s3]'": _PIP,
     'secure-a-site.md: curl --cacert security/ca.pem -H "Authorization: Bearer $KEY" '
+    "'https://localhost:8080/api/v1/audit?kind=anchor,tag&from=2027-01-15T08:00:00Z'": (
+        "asks a secured service: tests/service/api/routes/test_audit.py"
+    ),
+    'secure-a-site.md: curl --cacert security/ca.pem -H "Authorization: Bearer $KEY" '
     "-H 'Content-Type: application/json' \\": "asks a secured service: tests/service/api/routes/test_shares.py",
     "smooth-a-track.md: dropanchor replay RECORDING --smooth": f"{_FILES}: tests/e2e/test_replay_live_and_offline.py",
     "take-over-when-a-machine-dies.md: pip install 'dropanchor-service[postgresql]'": _PIP,

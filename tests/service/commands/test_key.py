@@ -17,7 +17,8 @@ def scanned(printed: str) -> str:
     """Return what a scanner reads from the code that a terminal with a dark ground shows."""
     rows = [line for line in printed.splitlines() if line and set(line) <= set(HALVES)]
     light = np.array([[HALVES[c][half] for c in row] for row in rows for half in (0, 1)], np.uint8)
-    found = zxingcpp.read_barcodes(np.kron(255 * light, np.ones((8, 8), np.uint8)))
+    image = np.kron(255 * light, np.ones((8, 8), np.uint8))
+    found = zxingcpp.read_barcodes(image, formats=zxingcpp.BarcodeFormat.QRCode)  # chance makes codes of other kinds
     assert len(found) == 1
     return str(found[0].text)
 
