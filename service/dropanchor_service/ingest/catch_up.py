@@ -263,7 +263,7 @@ class CatchUp:
             cached = any(self._cached[key] or self._retries[key] for key in taken.keys() - self._with_gap)
             self._suspended |= {key: [] for key in taken}
             self._releasing |= {key: set() for key in taken}
-            new = {key: self._not_released(key, suspended) for key, suspended in taken.items()}
+            new = {key: self._released[key].new(suspended, self._states_of(key)) for key, suspended in taken.items()}
         released = [message for key, suspended in new.items() for message in in_order(suspended, self._states_of(key))]
         released.sort(key=lambda message: message.arrival_ns)
         with self._lock:
@@ -278,16 +278,6 @@ class CatchUp:
             for key, suspended in taken.items():
                 self._end_release(key, suspended)
         return len(released)
-
-    def _not_released(self, key: str, suspended: list[Suspended]) -> list[Suspended]:
-        """Leave out what is on its way to the estimator already.
-
-        While the estimator is behind, what was fused does not tell, and the caches may be asked again. What came twice
-        could then be so old that its publisher seems to have begun to count again.
-        """
-        released = self._released[key]
-        released.forget_fused(self._states_of(key))
-        return [message for message in suspended if message.number is None or message.number not in released]
 
     def _note_asked(self, released: Iterable[Suspended]) -> None:
         """Remember that the caches have nothing more of what was published before these messages."""

@@ -1,9 +1,9 @@
 """The numbers of messages that were passed on, and that may not be fused yet."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from dropanchor_service.ingest.publishers import SequenceState
-from dropanchor_service.ingest.suspended import Number
+from dropanchor_service.ingest.suspended import Number, Suspended
 
 
 class Released:
@@ -22,12 +22,18 @@ class Released:
         else:
             runs.append(range(number.sequence, end))
 
-    def forget_fused(self, states: Mapping[int, SequenceState]) -> None:
-        """Forget the numbers that the publishers have passed."""
+    def new(self, suspended: Sequence[Suspended], states: Mapping[int, SequenceState]) -> list[Suspended]:
+        """Return the messages that are not on their way to the estimator already.
+
+        While it is behind, what was fused does not tell, and the caches may be asked again. What came twice could then
+        be so old that its publisher seems to have begun to count again. states: of publishers; what they have passed
+        is forgotten.
+        """
         for boot_id, runs in list(self._runs.items()):
             if (state := states.get(boot_id)) is not None:
                 ahead = (run[max(0, -state.ahead(run.start)) :] for run in runs)
                 self._runs[boot_id] = [run for run in ahead if run]
+        return [message for message in suspended if message.number is None or message.number not in self]
 
     def forget_from(self, numbers: Iterable[Number]) -> None:
         """Forget these numbers, which came back, and those after them."""
