@@ -18,9 +18,10 @@ def scanned(printed: str) -> str:
     rows = [line for line in printed.splitlines() if line and set(line) <= set(HALVES)]
     light = np.array([[HALVES[c][half] for c in row] for row in rows for half in (0, 1)], np.uint8)
     image = np.kron(255 * light, np.ones((8, 8), np.uint8))
-    found = zxingcpp.read_barcodes(image, formats=zxingcpp.BarcodeFormat.QRCode)  # chance makes codes of other kinds
+    read = zxingcpp.read_barcodes(image)
+    found = [code.text for code in read if code.format == zxingcpp.BarcodeFormat.QRCode]  # chance makes other kinds
     assert len(found) == 1
-    return str(found[0].text)
+    return str(found[0])
 
 
 def add(folder: Path, *words: str) -> int:
