@@ -7,7 +7,7 @@ import signal
 import subprocess
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -63,15 +63,21 @@ class Postgresql:
     def frozen(self) -> Iterator[None]:
         """Stop all processes of the server in this context, as a machine does that swaps or is paused."""
         assert self.process is not None
-        children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
-        pids = [self.process.pid, *map(int, children)]
-        for pid in pids:
-            os.kill(pid, signal.SIGSTOP)
+        parent = self.process.pid
+        os.kill(parent, signal.SIGSTOP)  # first, so that it starts no other
+        children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+        pids = [parent, *map(int, children)]
+
+        def send(number: signal.Signals) -> None:
+            for pid in pids:
+                with suppress(ProcessLookupError):  # one that served a connection may end by itself
+                    os.kill(pid, number)
+
+        send(signal.SIGSTOP)
         try:
             yield
         finally:
-            for pid in pids:
-                os.kill(pid, signal.SIGCONT)
+            send(signal.SIGCONT)
 
     def url(self, database: str = "postgres", user: str = "dropanchor") -> str:
         return f"postgresql://{user}@{self.host}:{self.port}/{database}"
