@@ -21,6 +21,7 @@ from dropanchor_service.estimation.fleet.frontend.gait import (
     FULL_SWING,
     GAIT,
     MAX_INTERVAL,
+    MM_PER_M,
     WALK,
     add_step_sample,
     start_gait,
@@ -159,7 +160,7 @@ def fill_carried_node(c: Carrying, yaw: float, acc_var: float, node: Node) -> No
     """Fill what the node of a carried tag has beside its yaw, rad. acc_var: that of `standstill`."""
     node.carried = c.carried
     node.walked = c.gait.walked
-    node.stepping = 1 if c.gait.regular >= FULL_SWING or _sets_off(c) else 0
+    node.stepping = 1 if c.gait.regular >= MM_PER_M * FULL_SWING or _sets_off(c) else 0
     if c.carried == 0:
         return
     node.dv_var = math.inf

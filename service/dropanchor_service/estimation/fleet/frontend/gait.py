@@ -30,7 +30,7 @@ GAIT: Final = np.dtype(
         ("since_peak_s", "f8"),  # since the highest x, which may become a step
         ("since_step_s", "f8"),  # since the last step's peak
         ("interval", "f8"),  # s, mean of the last steps
-        ("regular", "f8"),  # m/s^2, sum of W over the steps in a row at similar intervals, each FULL_SWING at most
+        ("regular", "i4"),  # mm/s^2, sum of W over the steps in a row at similar intervals, each FULL_SWING at most
         ("length_sum", "f8"),  # m, with forgetting
         ("time_sum", "f8"),  # s
         ("walked", "f8"),  # m since the person last stood
@@ -44,7 +44,9 @@ MIN_INTERVAL, MAX_INTERVAL = 0.28, 1.2  # s
 REVERSAL, REVERSAL_SHARE = 0.6, 0.35  # m/s^2, and of the mean swing
 MIN_SWING, FULL_SWING = 1.5, 2.5  # m/s^2, of a step that counts as walking, and the most that one counts for
 SIMILAR = 0.35  # relative deviation of an interval from the mean
-WALK = 6.0  # m/s^2, of `regular`, that make a walk
+MM_PER_M = 1000.0
+WALK = 6_000  # mm/s^2, of `regular`, that make a walk
+MOST_REGULAR = 100 * WALK  # a walk of days must not overflow
 FORGET = 1.5  # s of steps in the mean speed
 STEP_LENGTH = 0.362  # m per (m/s^2)^(1/3)
 FIRST_STEP = 0.5  # of its length: the way of somebody who stood until its peak
@@ -62,7 +64,7 @@ def start_gait(g: Gait, size: float) -> None:
     g.since_peak_s = 0.0
     g.since_step_s = MAX_INTERVAL
     g.interval = 0.0
-    g.regular = 0.0
+    g.regular = 0
     g.length_sum = g.time_sum = g.walked = 0.0
 
 
@@ -78,7 +80,7 @@ def add_step_sample(g: Gait, dt: float, size: float) -> bool:
     g.since_step_s += dt
     g.since_peak_s += dt
     if g.since_step_s > MAX_INTERVAL:
-        g.regular = g.swing = 0.0  # else large steps, or a device that was waved, would hide small ones
+        g.regular, g.swing = 0, 0.0  # else large steps, or a device that was waved, would hide small ones
         g.length_sum = g.time_sum = g.walked = 0.0
     reversal = max(REVERSAL, REVERSAL_SHARE * g.swing)
     if g.falling == 0:
@@ -106,12 +108,12 @@ def _end_step(g: Gait) -> bool:
         return False
     swing = g.peak - g.trough
     if interval > MAX_INTERVAL:
-        g.regular, g.interval, g.swing = 0.0, 0.0, swing
+        g.regular, g.interval, g.swing = 0, 0.0, swing
         g.walked = FIRST_STEP * _length(swing)
     else:
         first = g.interval == 0.0
         similar = swing > MIN_SWING and (first or abs(interval - g.interval) < SIMILAR * g.interval)
-        g.regular = g.regular + min(swing, FULL_SWING) if similar else 0.0
+        g.regular = min(g.regular + int(MM_PER_M * min(swing, FULL_SWING)), MOST_REGULAR) if similar else 0
         g.interval = interval if first else g.interval + 0.3 * (interval - g.interval)
         g.swing += 0.3 * (swing - g.swing)
         kept = math.exp(-interval / FORGET)
