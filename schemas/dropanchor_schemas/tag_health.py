@@ -70,20 +70,17 @@ class TagHealth(_Values):
     age_s: float = Field(description="Time since the tag's last report.")
 
 
+CareReason = Literal[
+    "sensor_fault", "battery_low", "firmware_differs", "spool_growing", "clock_offset", "clock_wrong", "no_contact"
+]
+
+
 class Care(BaseModel):
     """One thing that a person should do for a tag."""
 
     model_config = ConfigDict(frozen=True)
 
-    reason: Literal[
-        "sensor_fault",
-        "battery_low",
-        "firmware_differs",
-        "spool_growing",
-        "clock_offset",
-        "clock_wrong",
-        "no_contact",
-    ]
+    reason: CareReason
     hint: str
     hint_phrase: Phrase | None = Field(default=None, description="The hint by its code; null without one.")
     setting: dict[str, str | bool] | None = Field(

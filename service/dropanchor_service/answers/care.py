@@ -1,9 +1,10 @@
 """Find the tags that need a person, and say what to do for them."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, get_args
 
 from dropanchor_schemas.sentences import phrase_of, say
+from dropanchor_schemas.tag_health import CareReason
 from dropanchor_service.answers.findings import sentence_of
 from dropanchor_service.runtime.clock import ahead_or_behind, duration
 from dropanchor_service.store import HealthTable, Tag
@@ -19,15 +20,7 @@ _NOT_CORRECTED = say("clock_advice", "let both devices set their time automatica
 BATTERY_LOW = 0.2
 SPOOL_RISES = 3  # reports in a row
 NO_CONTACT_S = 300.0
-REASONS = (
-    "sensor_fault",
-    "battery_low",
-    "firmware_differs",
-    "spool_growing",
-    "clock_offset",
-    "clock_wrong",
-    "no_contact",
-)
+REASONS: tuple[CareReason, ...] = get_args(CareReason)
 
 
 def health_answer(record: HealthRecord | None, now_ns: int) -> dict[str, Any] | None:
