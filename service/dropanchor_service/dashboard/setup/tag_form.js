@@ -36,8 +36,8 @@ export function fillForm(form, settings, groups) {
   form.querySelector("datalist")?.replaceChildren(...[...groups].sort().map((group) => new Option(group)));
 }
 
-/** @param {HTMLInputElement} input */
-const isTyped = ({ value, dataset }) => value !== dataset.shown;
+/** Return whether a person has typed what is neither saved nor being saved. @param {HTMLInputElement} input */
+const isTyped = ({ value, dataset }) => value !== (dataset.sent ?? dataset.shown);
 
 /** Note that what the form shows now is being saved, or that it is not. @param {HTMLFormElement} form @param {boolean} isSent */
 export function noteSent(form, isSent) {
@@ -46,8 +46,7 @@ export function noteSent(form, isSent) {
 
 /** Return what puts back what a person has typed and not saved, after the form was filled anew. @param {HTMLFormElement} form */
 export function typedIn(form) {
-  const inputs = FIELDS.map((name) => field(form, name)).filter((input) => isTyped(input) && input.value !== input.dataset.sent);
-  const typed = inputs.map((input) => ({ input, value: input.value }));
+  const typed = FIELDS.map((name) => field(form, name)).filter(isTyped).map((input) => ({ input, value: input.value }));
   return () => typed.forEach(({ input, value }) => (input.value = value));
 }
 

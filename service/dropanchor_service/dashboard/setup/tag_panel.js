@@ -104,8 +104,9 @@ export class TagPanel {
     await this.#saving.now;
     await this.#loading;
     if (!this.#seen || tag !== this.#tag) return;
+    const patch = patchOf(this.form);
     noteSent(this.form, true);
-    const isSaved = await this.#saving.until(this.#edit(t("setup.saved", { tag }), patchOf(this.form)));
+    const isSaved = await this.#saving.until(this.#edit(t("setup.saved", { tag }), patch));
     if (!isSaved && tag === this.#tag) noteSent(this.form, false);
   }
 
