@@ -53,6 +53,8 @@ def violations(page: Page, axe: str) -> list[str]:
     return [
         f"{look}: {rule['id']}: {node['target']} {node['failureSummary']}"
         for look in every_look(page)
-        for rule in page.evaluate("axe.run(document, { resultTypes: ['violations'] })")["violations"]
+        for rule in page.evaluate(
+            "axe.run(document, { resultTypes: ['violations'] }).then(({ violations }) => violations)"
+        )
         for node in rule["nodes"]
     ]

@@ -1,6 +1,7 @@
 """Python calls only the kernels that are made for it: a call of another one would be refused, or end the process."""
 
 import ast
+import functools
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,7 +14,12 @@ SERVICE = Path(__file__).parents[3] / "service"
 MAKER = "dropanchor_service.estimation.fleet.compiled"
 ROOTS = (SERVICE, SERVICE / "evaluation")
 SOURCES = sorted(path for root in ("dropanchor_service", "evaluation") for path in (SERVICE / root).rglob("*.py"))
-TREES = {path: ast.parse(path.read_text()) for path in SOURCES}
+
+
+@functools.cache
+def trees() -> dict[Path, ast.Module]:
+    """Return the syntax of every file. Parsed while tests are collected, it would take seconds in each worker."""
+    return {path: ast.parse(path.read_text()) for path in SOURCES}
 
 
 def module_of(path: Path) -> str:
@@ -29,7 +35,7 @@ def inner_kernels() -> set[tuple[str, str]]:
     """Return module and name of the kernels that only kernels may call."""
     return {
         (module_of(path), node.name)
-        for path, tree in TREES.items()
+        for path, tree in trees().items()
         if any(isinstance(node, ast.ImportFrom) and node.module == MAKER for node in tree.body)
         for node in tree.body
         if isinstance(node, ast.FunctionDef) and is_kernel(node)
@@ -63,7 +69,7 @@ def test_python_calls_no_inner_kernel() -> None:
     inner = inner_kernels()
     assert len(inner) > 300
     called = []
-    for path, tree in TREES.items():
+    for path, tree in trees().items():
         known = {name: (module_of(path), name) for module, name in inner if module == module_of(path)}
         for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom):
