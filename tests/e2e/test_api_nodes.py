@@ -148,7 +148,7 @@ def test_two_nodes_show_all_sites_through_a_move_a_death_and_an_outage_of_the_da
 
 
 @pytest.mark.browser
-def test_the_page_of_a_node_leads_from_the_overview_to_a_moving_dot(cluster: Cluster, tmp_path: Path) -> None:
+def test_the_page_of_a_node_leads_from_the_overview_to_a_moving_dot(cluster: Cluster) -> None:
     with ExitStack() as opened:
         browser = opened.enter_context(running_chromium())
         opened.enter_context(driving_carts(cluster, "019.north"))
@@ -156,14 +156,12 @@ def test_the_page_of_a_node_leads_from_the_overview_to_a_moving_dot(cluster: Clu
         watched = opened.enter_context(open_page(browser, f"{node.url}/"))
         page = watched.page
         expect(page.locator("#sites tr")).to_have_count(len(SITES))
-        page.screenshot(path=tmp_path / "overview.png")
         page.locator("a[data-site='019.north']").click()
         watched.wait_for("window.dropanchor?.status() === 'live'")
         watched.wait_for("dropanchor.tags().some((tag) => tag.tag === 'cart' && tag.semiMajor > 0)")
         place = "dropanchor.tags().find((tag) => tag.tag === 'cart').pixel"
         x, y = page.evaluate(place)
         watched.wait_for(f"Math.hypot({place}[0] - {x}, {place}[1] - {y}) > 20")
-        page.screenshot(path=tmp_path / "site.png")
         assert watched.origins == {node.url}
         assert watched.errors == []
         cluster.owners["017"].process.kill()
@@ -172,4 +170,3 @@ def test_the_page_of_a_node_leads_from_the_overview_to_a_moving_dot(cluster: Clu
             "Nobody serves the sites of 017 now, so they are missing here."
         )
         expect(page.locator("#sites tr")).to_have_count(4)
-        page.screenshot(path=tmp_path / "unavailable.png")

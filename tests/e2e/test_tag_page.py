@@ -64,7 +64,6 @@ def test_a_phone_that_opens_the_link_of_its_key_has_a_pose(tmp_path: Path, capsy
             pose = service.ask("GET", "/api/v1/tags/anna/pose", headers={"authorization": f"Bearer {reader}"}).json()
             page.wait_for("counts.sent > 600")
             assert page.errors == []
-            page.page.screenshot(path=tmp_path / "tracking.png")
         assert service.stop() == 0
     assert (pose["state"], pose["anchor"]) == ("tracking", "7")
     assert math.hypot(pose["x"], pose["y"]) == pytest.approx(pose["range_m"], abs=2.0)

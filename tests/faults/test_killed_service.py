@@ -92,5 +92,8 @@ def lost(service: Running) -> dict[str, float]:
 
 def wait_until_current(service: Running) -> float:
     """Wait until the poses are current. Return the time since the start of the process in s."""
-    wait_until(lambda: is_current(service, TAGS))
+    try:
+        wait_until(lambda: is_current(service, TAGS))
+    except AssertionError:
+        pytest.fail(f"not current: {service.get('/api/v1/poses')} {service.get('/api/v1/tags')} {''.join(service.log)}")
     return time.monotonic() - service.began_s

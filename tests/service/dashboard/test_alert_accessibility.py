@@ -1,7 +1,5 @@
 """The accessibility checker axe-core finds no violation in the views of alerts."""
 
-from pathlib import Path
-
 import pytest
 from playwright.sync_api import Browser
 
@@ -32,7 +30,7 @@ def busy_place() -> ZonePlace:
     return place
 
 
-def test_no_violation_in_the_lists_and_the_forms(chromium: Browser, axe: str, tmp_path: Path) -> None:
+def test_no_violation_in_the_lists_and_the_forms(chromium: Browser, axe: str) -> None:
     place = busy_place()
     with (
         served(place),
@@ -40,7 +38,6 @@ def test_no_violation_in_the_lists_and_the_forms(chromium: Browser, axe: str, tm
     ):
 
         def check(view: str) -> None:
-            page.page.screenshot(path=tmp_path / f"{view}.png")
             assert violations(page.page, axe) == [], view
             for look in every_look(page.page):
                 assert page.page.evaluate(WIDER_THAN_ITS_PLACE) == [], (view, look)

@@ -24,7 +24,6 @@ def test_no_violation_while_a_base_map_is_shown_and_hidden(chromium: Browser, ax
     ):
         place.move("cart", x=20.0, y=10.0)
         page.wait_for("dropanchor.basemap().tiles > 0 && dropanchor.tags().length === 1")
-        page.page.screenshot(path=tmp_path / "shown.png")
         assert violations(page.page, axe) == []
         page.page.locator("#basemap").focus()
         page.page.keyboard.press("Enter")

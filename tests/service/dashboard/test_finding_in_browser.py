@@ -84,7 +84,7 @@ def test_enter_selects_the_only_hit_and_arrows_choose_among_several(chromium: Br
 
 
 def test_several_tags_are_selected_by_mouse_keys_and_rectangle_compared_and_followed(
-    chromium: Browser, place: Place, tmp_path: Path, axe: str
+    chromium: Browser, place: Place, axe: str
 ) -> None:
     put_tags(place)
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
@@ -122,7 +122,6 @@ def test_several_tags_are_selected_by_mouse_keys_and_rectangle_compared_and_foll
         page.page.mouse.move(box["x"] + corner["x"], box["y"] + corner["y"])
         page.page.mouse.down()
         page.page.mouse.move(box["x"] + opposite["x"], box["y"] + opposite["y"], steps=3)
-        page.page.screenshot(path=tmp_path / "rectangle.png")
         page.page.mouse.up()
         page.page.keyboard.up("Shift")
         assert selected(page) == ["cart-12", "cart-2"]
@@ -272,5 +271,4 @@ def test_a_long_press_offers_the_same_and_a_key_that_only_reads_no_change(chromi
             page.page.locator("#several summary").click()
             expect(page.page.get_by_role("button", name="GeoJSON").last).to_be_visible()
             expect(page.page.get_by_role("button", name="Put into group")).to_be_hidden()
-            page.page.screenshot(path=tmp_path / "phone.png")
             assert [error for error in page.errors if "401" not in error] == []

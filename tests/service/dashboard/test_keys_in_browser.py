@@ -48,7 +48,6 @@ def test_keys_are_made_used_and_revoked_without_a_terminal(chromium: Browser, ax
         panel.get_by_role("button", name="Create key").click()
         expect(panel.get_by_role("list")).to_contain_text("tag anna")
         link = panel.locator("code").inner_text()
-        page.page.screenshot(path=tmp_path / "keys.png")
         assert violations(page.page, axe) == []
         with open_page(chromium, link) as phone:
             expect(phone.page.locator("body")).to_contain_text("anna")

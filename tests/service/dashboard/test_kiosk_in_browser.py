@@ -1,7 +1,5 @@
 """The page on a wall: large type, no controls, a screen that stays on, and one tag after another when asked."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, expect
@@ -26,7 +24,7 @@ CUT = """() => [...document.querySelectorAll("dd, td:not(.c-tag), th, h1, h2")]
 
 @pytest.mark.parametrize("size", [(1280, 800), (1920, 1080), (1080, 1920)], ids=lambda size: f"{size[0]}x{size[1]}")
 def test_a_wall_has_large_type_and_no_controls_and_stays_on(
-    chromium: Browser, place: Place, size: tuple[int, int], tmp_path: Path
+    chromium: Browser, place: Place, size: tuple[int, int]
 ) -> None:
     names = [f"cart-{number}" for number in range(6)]
     place.move(*names, x=np.arange(6.0), y=[1.0, -2.0, 3.0, 0.0, 2.0, -1.0], sigma_pos=0.12, speed=1.2)
@@ -39,7 +37,6 @@ def test_a_wall_has_large_type_and_no_controls_and_stays_on(
     ) as page:
         expect(page.page.locator("#detail h2")).to_have_text("cart-3")
         page.wait_for_map(6)
-        page.page.screenshot(path=tmp_path / "wall.png")
         places = [tag["pixel"] for tag in page.tags().values()]
         assert max(x for x, _ in places) - min(x for x, _ in places) > 150  # the map fits the tags
         assert page.page.evaluate(CONTROLS) == []

@@ -1,7 +1,6 @@
 """The browser notifies about chosen events, and is asked for permission by a click alone."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
@@ -44,7 +43,7 @@ def denying(page: Page) -> None:
     page.add_init_script(BROWSER % "denied")
 
 
-def test_chosen_events_are_notified_and_a_click_shows_them(chromium: Browser, yard: ZonePlace, tmp_path: Path) -> None:
+def test_chosen_events_are_notified_and_a_click_shows_them(chromium: Browser, yard: ZonePlace) -> None:
     with watched_page(chromium, yard.url, prepare=granting) as page:
         page.wait_for("dropanchor.events()")
         yard.go("cart-3", 3.0, 3.0)
@@ -52,7 +51,6 @@ def test_chosen_events_are_notified_and_a_click_shows_them(chromium: Browser, ya
         page.page.get_by_role("button", name="Display").click()
         assert page.page.evaluate("asked") == []
         page.page.get_by_label("A tag leaves a zone").check()
-        page.page.screenshot(path=tmp_path / "notifications.png")
         page.page.keyboard.press("Escape")
         assert page.page.evaluate("asked") == [True]
         yard.go("cart-3", -10.0, -10.0)

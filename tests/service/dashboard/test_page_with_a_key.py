@@ -42,4 +42,3 @@ def test_the_page_asks_for_a_key_stores_it_and_shows_the_tags(tmp_path: Path, ch
         keys.revoke("dashboard")
         now_s = 2.0
         page.locator("#locked").wait_for()
-        page.screenshot(path=tmp_path / "locked.png")

@@ -318,9 +318,7 @@ def test_a_heat_map_shows_where_tags_were_and_how_much_is_left_out(chromium: Bro
         assert page.errors == []
 
 
-def test_the_past_is_accessible_and_nothing_is_cut_off(
-    chromium: Browser, past: tuple[Place, int], axe: str, tmp_path: Path
-) -> None:
+def test_the_past_is_accessible_and_nothing_is_cut_off(chromium: Browser, past: tuple[Place, int], axe: str) -> None:
     place, end_ns = past
     link = link_to(place, end_ns, 155, tag="second", heat="1")
     with watched_page(chromium, link, reduced_motion="reduce") as page:
@@ -331,7 +329,6 @@ def test_the_past_is_accessible_and_nothing_is_cut_off(
         cut += "&& e.getBoundingClientRect().right > innerWidth + 1).map((e) => e.outerHTML)"
         site = "((site) => site.scrollWidth <= site.clientWidth)(document.getElementById('site'))"
         for look in every_look(page.page):
-            page.page.screenshot(path=tmp_path / f"past-{look}.png")
             assert page.page.evaluate(cut) == [], look
             assert page.page.evaluate(site), look
         page.page.set_viewport_size({"width": 390, "height": 844})
@@ -341,11 +338,9 @@ def test_the_past_is_accessible_and_nothing_is_cut_off(
         covered = "((legend, map) => legend.height / map.height)(...['heat', 'map'].map("
         covered += "(id) => document.getElementById(id).getBoundingClientRect()))"
         assert page.page.evaluate(covered) < 0.35
-        page.page.screenshot(path=tmp_path / "folded.png")
         page.page.locator("#heat summary").click()
         expect(page.page.locator("#heat [data-part='note']")).to_contain_text("Most:")
         page.page.locator("[data-part='figures']").click()
         page.page.locator("#figures tbody tr").first.wait_for()
         assert violations(page.page, axe) == []
-        page.page.screenshot(path=tmp_path / "figures.png")
         assert page.errors == []

@@ -1,7 +1,5 @@
 """The accessibility checker axe-core finds no violation where floor plans are set up and shown."""
 
-from pathlib import Path
-
 import pytest
 from playwright.sync_api import Browser, expect
 
@@ -36,13 +34,12 @@ def hall(place: PlanPlace) -> None:
     place.put("upper", svg_file(), 0.01, Floor(name="Upper floor", bottom_m=3.0, top_m=6.0))
 
 
-def test_no_violation_while_plans_are_shown_uploaded_and_aligned(chromium: Browser, axe: str, tmp_path: Path) -> None:
+def test_no_violation_while_plans_are_shown_uploaded_and_aligned(chromium: Browser, axe: str) -> None:
     with plan_place() as place:
         hall(place)
         with watched_page(chromium, place.url, reduced_motion="reduce") as page:
 
             def check(view: str) -> None:
-                page.page.screenshot(path=tmp_path / f"{view}.png")
                 assert violations(page.page, axe) == [], view
 
             page.wait_for("dropanchor.plans()[0]?.isReady && dropanchor.drawing().elsewhere === 1")

@@ -41,7 +41,6 @@ def test_a_link_of_a_group_is_created_copied_used_and_revoked(chromium: Browser,
             boss.page.get_by_role("button", name="Create link").click()
             link = boss.page.locator("#shared-link")
             expect(link).to_contain_text("share=")
-            boss.page.screenshot(path=tmp_path / "created.png")
             address = link.inner_text()
             expect(boss.page.get_by_label("It shows")).to_have_value("group")
             with watched_page(chromium, address) as guest:
@@ -55,13 +54,11 @@ def test_a_link_of_a_group_is_created_copied_used_and_revoked(chromium: Browser,
                 expect(guest.page.locator("#link")).to_contain_text("share=")
                 expect(guest.page.locator("#share")).to_be_hidden()
                 guest.page.keyboard.press("Escape")
-                guest.page.screenshot(path=tmp_path / "guest.png")
                 boss.page.get_by_role("button", name="Revoke Visitors").click()
                 wait_until(lambda: not links.of_site("default"))
                 bench.move("van", x=5.0)
                 expect(guest.page.locator("#ended")).to_contain_text("It was revoked")
                 expect(guest.page.locator("#locked")).to_be_hidden()
-                guest.page.screenshot(path=tmp_path / "revoked.png")
 
 
 def test_an_expired_link_says_when_it_expired_and_every_text_is_from_the_catalogue(

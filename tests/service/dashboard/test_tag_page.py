@@ -243,7 +243,7 @@ def test_after_stop_nothing_more_is_taken_and_the_rest_is_sent(chromium: Browser
         assert page.counts()["taken"] == taken == service.imu_samples()
 
 
-def test_the_page_has_no_accessibility_violation(chromium: Browser, service: Service, axe: str, tmp_path: Path) -> None:
+def test_the_page_has_no_accessibility_violation(chromium: Browser, service: Service, axe: str) -> None:
     with ExitStack() as opened:
         with service.running():
             with tag_page(chromium, f"http://127.0.0.1:{service.port}/tag", reduced_motion="reduce") as page:
@@ -259,4 +259,3 @@ def test_the_page_has_no_accessibility_violation(chromium: Browser, service: Ser
             assert violations(page.page, axe) == []
         page.wait_for("document.getElementById('state').textContent === 'Out of date'")
         assert violations(page.page, axe) == []
-        page.page.screenshot(path=tmp_path / "outdated.png")

@@ -111,9 +111,7 @@ def test_a_deleted_tag_of_the_settings_file_is_given_back(chromium: Browser, yar
     assert yard.store.tags == yard.store.configured.tags
 
 
-def test_who_changed_what_is_shown_and_undone_unless_it_was_changed_since(
-    chromium: Browser, yard: Yard, tmp_path: Path
-) -> None:
+def test_who_changed_what_is_shown_and_undone_unless_it_was_changed_since(chromium: Browser, yard: Yard) -> None:
     moved = {"id": "1", "x": 50.0}
     with yard.served() as url, open_page(chromium, url, reduced_motion="reduce") as page:
         headers = {"authorization": f"Bearer {yard.secrets['write']}"}
@@ -122,7 +120,6 @@ def test_who_changed_what_is_shown_and_undone_unless_it_was_changed_since(
         dialog = opened(page, yard.secrets["admin"])
         entries = dialog.get_by_role("list", name="Who changed what")
         expect(entries).to_contain_text("write: anchor 1 was changed. x: 0 → 50; z: 2.5 → 0")
-        page.page.screenshot(path=tmp_path / "trail.png")
         dialog.get_by_role("button", name="Undo: anchor 1").click()
         expect(entries).to_contain_text("admin: anchor 1 was changed. x: 50 → 0; z: 0 → 2.5")
         assert yard.store.anchor("1") == Anchor(id="1", z=2.5)

@@ -1,7 +1,5 @@
 """A person chooses the units of lengths and speeds; what is stored and sent stays SI."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, expect
@@ -21,9 +19,7 @@ def radius_of(place: ZonePlace) -> float:
     return shape.radius_m
 
 
-def test_units_are_chosen_remembered_and_used_everywhere_while_settings_stay_si(
-    chromium: Browser, tmp_path: Path
-) -> None:
+def test_units_are_chosen_remembered_and_used_everywhere_while_settings_stay_si(chromium: Browser) -> None:
     place = zone_place()
     place.put(disc("dock", 0.0, 0.0, 3.048, name="Dock", speed_mps=2.5))
     place.go("cart", 3.048, -6.096)
@@ -69,5 +65,4 @@ def test_units_are_chosen_remembered_and_used_everywhere_while_settings_stay_si(
         north = next(a for a in place.bench.answers.site.site.anchors if a.id == "north")
         assert [north.x, north.y] == pytest.approx([0.0, 30.48])
         watched.wait_for("dropanchor.drawing().still")
-        page.screenshot(path=tmp_path / "feet.png")
         assert watched.errors == []

@@ -2,7 +2,6 @@
 
 import time
 from itertools import combinations
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -101,9 +100,7 @@ def test_nothing_moves_by_itself_with_reduced_motion(chromium: Browser, place: P
         assert page.page.evaluate(MOVING) != []
 
 
-def test_a_question_mark_shows_the_keys_and_keys_go_where_one_types(
-    chromium: Browser, place: Place, tmp_path: Path
-) -> None:
+def test_a_question_mark_shows_the_keys_and_keys_go_where_one_types(chromium: Browser, place: Place) -> None:
     place.move("cart", x=1.0, y=1.0)
     with watched_page(chromium, place.url) as watched:
         page = watched.page
@@ -112,7 +109,6 @@ def test_a_question_mark_shows_the_keys_and_keys_go_where_one_types(
         keys = page.get_by_role("dialog", name="Keyboard")
         expect(keys).to_be_visible()
         assert keys.locator("dt").count() == keys.locator("dd").count() == 15
-        page.screenshot(path=tmp_path / "keys.png")
         page.keyboard.press("/")
         expect(page.locator("#filter")).not_to_be_focused()
         page.keyboard.press("Escape")

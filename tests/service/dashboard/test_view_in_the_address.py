@@ -1,7 +1,6 @@
 """The address of the page holds the view: a copied link shows the same tag, map, filter, language and units."""
 
 import time
-from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
@@ -37,9 +36,7 @@ def fleet(place: Place) -> Place:
     return place
 
 
-def test_a_copied_link_shows_the_same_tag_map_filter_language_and_units(
-    chromium: Browser, fleet: Place, tmp_path: Path
-) -> None:
+def test_a_copied_link_shows_the_same_tag_map_filter_language_and_units(chromium: Browser, fleet: Place) -> None:
     with watched_page(chromium, f"{fleet.url}?lang=de&length=ft", reduced_motion="reduce") as page:
         page.page.locator("tr[data-tag='cart-1']").click()
         page.page.locator("#filter").fill("CART")
@@ -53,7 +50,6 @@ def test_a_copied_link_shows_the_same_tag_map_filter_language_and_units(
         link, view = page.page.url, page.page.evaluate(VIEW)
         page.page.get_by_role("button", name="Anzeige").click()
         expect(page.page.locator("#link")).to_have_text(link)
-        page.page.screenshot(path=tmp_path / "display.png")
         assert page.errors == []
     with watched_page(chromium, link, reduced_motion="reduce") as page:
         expect(page.page.locator("#count")).to_have_text("1 von 6 Tags")

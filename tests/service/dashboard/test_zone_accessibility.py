@@ -1,7 +1,6 @@
 """The accessibility checker axe-core finds no violation in the views of zones and events."""
 
 from contextlib import ExitStack
-from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser
@@ -38,16 +37,13 @@ def draw_a_crossing(page: WatchedPage) -> None:
     page.page.get_by_role("form", name="Zone", exact=True).get_by_role("alert").wait_for()
 
 
-def test_no_violation_in_the_lists_the_editor_and_without_a_connection(
-    chromium: Browser, axe: str, tmp_path: Path
-) -> None:
+def test_no_violation_in_the_lists_the_editor_and_without_a_connection(chromium: Browser, axe: str) -> None:
     place = busy_yard()
     with ExitStack() as pages:
         with served(place):
             page = pages.enter_context(watched_page(chromium, place.url, reduced_motion="reduce"))
 
             def check(view: str) -> None:
-                page.page.screenshot(path=tmp_path / f"{view}.png")
                 assert violations(page.page, axe) == [], view
 
             page.wait_for("dropanchor.events() && dropanchor.zones().yard === 1")
