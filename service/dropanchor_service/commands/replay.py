@@ -6,12 +6,10 @@ from collections.abc import Iterator, Sequence
 from importlib import import_module
 from typing import Any
 
-from pydantic import ValidationError
 from tqdm import tqdm
 
-from dropanchor_schemas.site import TagSettings
 from dropanchor_service.commands.replay_mcap import replay_files
-from dropanchor_service.commands.replay_options import COLUMNS, DESCRIPTION, EPILOG, add_arguments
+from dropanchor_service.commands.replay_options import COLUMNS, DESCRIPTION, EPILOG, TAG_OPTIONS, add_arguments
 from dropanchor_service.commands.replay_output import SOURCE, check, opened, values_of
 from dropanchor_service.commands.replay_report import no_usable_range, report, score_of
 from dropanchor_service.commands.replay_source import mcap_files_of
@@ -31,6 +29,7 @@ from dropanchor_service.offline.replay import (
 )
 from dropanchor_service.offline.sensors import CheckedEngine, known_from_start
 from dropanchor_service.settings.engine_columns import tag_columns
+from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError, load_settings
 from dropanchor_tag_client.recording import Recording, RecordingError, read_recording
 
@@ -60,12 +59,14 @@ def run(arguments: argparse.Namespace) -> int:
 def _replay_folder(arguments: argparse.Namespace) -> int:
     recording = read_recording(arguments.recording)
     anchors = arguments.anchor or _only_anchor(recording)
-    settings = tag_columns(_tag_settings(arguments), declination_rad=0.0)
-    ready = prepared(with_units(recording, settings), anchors, arguments.clock_offset)
+    settings = _settings(arguments)
+    tag, site = settings.tag_defaults, settings.site
+    columns = tag_columns(tag, site.declination_rad, site.declination_std_rad)
+    ready = prepared(with_units(recording, columns), anchors, arguments.clock_offset)
     for sentence in ready.sentences:
         print(sentence)
-    track = _track(arguments, recording, ready.samples, settings)
-    return _conclude(arguments, recording, anchors, ready.samples, track)
+    track = _track(arguments, _engine(arguments, settings), recording, ready.samples, columns)
+    return _conclude(arguments, recording, anchors, ready.samples, track, start_is_given=tag.start is not None)
 
 
 def _reject_options_of_folders(arguments: argparse.Namespace) -> None:
@@ -78,10 +79,11 @@ def _reject_options_of_folders(arguments: argparse.Namespace) -> None:
             raise SettingsError(f"--{name.replace('_', '-')} cannot be given: the MCAP recording defines it")
 
 
-def _track(arguments: argparse.Namespace, recording: Recording, samples: Samples, settings: Array) -> Track:
+def _track(
+    arguments: argparse.Namespace, inner: Engine, recording: Recording, samples: Samples, settings: Array
+) -> Track:
     if len(samples.batch.ranges) == 0:
         raise RecordingError(no_usable_range(recording.name, samples))
-    inner = _engine(arguments)
     engine = CheckedEngine(inner, known_from_start(samples, bool(settings["acc_sign_told"])))
     steps = []
     total_s = samples.end_s - samples.start_s
@@ -95,10 +97,9 @@ def _track(arguments: argparse.Namespace, recording: Recording, samples: Samples
     return smoothed(inner, arguments.lag, samples.zero_ns) if arguments.smooth else track_of(steps, samples.zero_ns)
 
 
-def _engine(arguments: argparse.Namespace) -> Engine:
+def _engine(arguments: argparse.Namespace, settings: Settings) -> Engine:
     if arguments.lag is not None and not arguments.smooth:
         raise SettingsError("--lag limits --smooth: give both")
-    settings = load_settings(arguments.config, {"engine": arguments.engine} if arguments.engine else None)
     if not arguments.smooth:
         return create_engine(settings)
     if settings.engine != "fleet":
@@ -106,36 +107,24 @@ def _engine(arguments: argparse.Namespace) -> Engine:
     return smoothing_engine()
 
 
-def _tag_settings(arguments: argparse.Namespace) -> TagSettings:
-    try:
-        return TagSettings(
-            height_m=arguments.tag_height,
-            range_std_m=arguments.range_std,
-            range_bias_m=arguments.range_bias,
-            range_bias_std_m=arguments.range_bias_std,
-            range_scale=arguments.range_scale,
-            mount_angle_rad=arguments.mount_angle,
-            mount_angle_std_rad=arguments.mount_angle_std,
-            lever_forward_m=arguments.lever_forward,
-            lever_left_m=arguments.lever_left,
-            slip_std_rad=arguments.slip_std,
-            speed_max_mps=arguments.speed_max,
-            reverse_allowed=arguments.reverse,
-            heading_source=arguments.heading,
-            heading_std_rad=arguments.heading_std,
-            acc_unit=arguments.acc_unit,
-            acc_reversed={"yes": True, "no": False}.get(arguments.acc_reversed),
-            gyro_unit=arguments.gyro_unit,
-            range_unit=arguments.range_unit,
-            start=arguments.start,
-        )
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise SettingsError(f"{first['loc'][0]}: {first['msg']}") from error
+def _settings(arguments: argparse.Namespace) -> Settings:
+    """Return the settings of --config, and above them those of the other options."""
+    told = {field: getattr(arguments, option) for field, option in TAG_OPTIONS.items()}
+    given: dict[str, Any] = {"tag_defaults": {field: value for field, value in told.items() if value is not None}}
+    if arguments.declination is not None:
+        given["site"] = {"declination_rad": arguments.declination}
+    if arguments.engine:
+        given["engine"] = arguments.engine
+    return load_settings(arguments.config, given)
 
 
 def _conclude(
-    arguments: argparse.Namespace, recording: Recording, anchors: Sequence[str], samples: Samples, track: Track
+    arguments: argparse.Namespace,
+    recording: Recording,
+    anchors: Sequence[str],
+    samples: Samples,
+    track: Track,
+    start_is_given: bool,
 ) -> int:
     if arguments.out:
         with opened(arguments.out, COLUMNS if track.smoothed is None else (*COLUMNS, SOURCE)) as write:
@@ -143,7 +132,7 @@ def _conclude(
         print(f"{len(track.poses)} poses: {arguments.out}")
     first = recording.anchor(anchors[0])
     score = score_of(track, truth_of(recording), (first.x, first.y))
-    for line in report(track, score, samples, start_is_given=arguments.start is not None):
+    for line in report(track, score, samples, start_is_given):
         print(line)
     if arguments.plot:
         from dropanchor_service.offline.track_plot import plot_track

@@ -11,24 +11,28 @@ from pathlib import Path
 from typing import IO, Any
 
 from dropanchor_service.answers.frames import FRAMES, STATES, published_states
+from dropanchor_service.answers.pose_fields import height_source_values
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.settings.sources import SettingsError
 
 Write = Callable[[Iterable[Sequence[Any]]], None]
-VALUES = ("x", "y", "heading_rad", "speed_mps", "var_x", "cov_xy", "var_y", "p_mode", "state", "frame")
+_NUMBERS = ("x", "y", "heading_rad", "speed_mps", "var_x", "cov_xy", "var_y", "p_mode", "z", "z_std")
+_WORDS = ("state", "frame", "z_source")
+VALUES = (*_NUMBERS, *_WORDS)
 FORMATS = (".csv", ".csv.gz", ".jsonl", ".jsonl.gz", ".parquet")
 SOURCE = "source"  # of a pose of a smoothed track: smoothed or filtered
-_WHOLE, _TEXTS = ("t_ns",), ("tag", "state", "frame", SOURCE)
+_WHOLE, _TEXTS = ("t_ns",), ("tag", *_WORDS, SOURCE)
 
 
 def values_of(poses: Array) -> Iterator[list[Any]]:
     """Yield VALUES of each POSE row. An unknown number is NaN. The numbers are in the frame that `frame` names."""
     cov = poses["cov"]
     columns = [*(poses[name] for name in ("x", "y", "heading", "speed"))]
-    columns += [cov[:, 0, 0], cov[:, 0, 1], cov[:, 1, 1], poses["p_mode"]]
+    columns += [cov[:, 0, 0], cov[:, 0, 1], cov[:, 1, 1], *(poses[name] for name in ("p_mode", "z", "z_std"))]
     states, frames = published_states(poses["state"], poses["frame"]).tolist(), poses["frame"].tolist()
-    for *numbers, state, frame in zip(*(column.tolist() for column in columns), states, frames, strict=True):
-        yield [*numbers, STATES[state], FRAMES[frame]]
+    numbers = zip(*(column.tolist() for column in columns), strict=True)
+    for row, state, frame, source in zip(numbers, states, frames, height_source_values(poses), strict=True):
+        yield [*row, STATES[state], FRAMES[frame], source]
 
 
 def check(path: Path) -> None:

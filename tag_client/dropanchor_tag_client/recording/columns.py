@@ -72,9 +72,9 @@ PRESSURE = Columns(
 TRUTH = Columns(
     "truth",
     "true poses",
-    "t_s, x, y, z, yaw_rad: true position of the tag, m, and its heading, rad",
+    "t_s, x, y, [z], [yaw_rad]: true position of the tag, m, and its heading, rad",
     ("x", "y", "z", "yaw_rad"),
-    may_be_nan=("z", "yaw_rad"),
+    optional=("z", "yaw_rad"),
     interval_s=(2e-4, 60.0),
 )
 FILES = (ANCHORS, RANGE, IMU, HEADING, PRESSURE, TRUTH)

@@ -9,6 +9,8 @@ import pytest
 
 from dropanchor_service.cli import main
 from dropanchor_service.commands import replay
+from dropanchor_tag_client.simulator.recording import write_recording
+from service.commands.replays import yard
 from support.recordings import recording_or_skip, write_square
 
 
@@ -47,6 +49,46 @@ def test_the_default_engine_is_fleet_which_needs_no_start(tmp_path: Path, capsys
     assert "engine fleet on" in printed.out
     assert printed.err == ""  # a progress bar is for terminals only
     assert math.isfinite(float(rows(out)[-1]["x"]))
+
+
+def test_a_truth_needs_no_heading_and_no_height(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder, errors = write_square(tmp_path, range_std_m=0.05), []
+    for columns in (("t_s", "x", "y", "z", "yaw_rad"), ("t_s", "x", "y")):
+        true = rows(folder / "truth.csv")
+        with (folder / "truth.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, columns, extrasaction="ignore")
+            writer.writeheader()
+            writer.writerows(true)
+        assert call(folder, "--anchor", "A", "--start=10,0,1.5708") == 0
+        errors.append(capsys.readouterr().out.partition("RMSE ")[2])
+    assert errors[0]
+    assert errors[0] == errors[1]
+
+
+@pytest.mark.parametrize(
+    ("option", "told", "other"),
+    [
+        ("--motion=carried", '[tag_defaults]\nmotion = "carried"', '[tag_defaults]\nmotion = "vehicle"'),
+        ("--height-motion=free", '[tag_defaults]\nheight_motion = "free"', '[tag_defaults]\nheight_motion = "flat"'),
+        ("--declination=0.5", "[site]\ndeclination_rad = 0.5", "[site]\ndeclination_rad = -0.5"),
+        ("--start=10,0", "[tag_defaults]\nstart = { x = 10.0, y = 0.0 }", "tag_defaults.start = { x = 4, y = 4 }"),
+    ],
+)
+def test_a_settings_file_says_what_options_say_of_a_tag_and_an_option_wins(
+    tmp_path: Path, option: str, told: str, other: str
+) -> None:
+    def poses(*options: str | Path) -> str:
+        assert call(folder, *options, "--out", tmp_path / "poses.csv") == 0
+        return (tmp_path / "poses.csv").read_text()
+
+    folder = tmp_path / "drive"
+    write_recording(yard(30.0), folder)
+    for name, text in (("told", told), ("other", other)):
+        (tmp_path / f"{name}.toml").write_text(text)
+    by_option = poses(option)
+    assert by_option == poses("--config", tmp_path / "told.toml")
+    assert by_option == poses("--config", tmp_path / "other.toml", option)
+    assert by_option != poses("--config", tmp_path / "other.toml")
 
 
 def test_no_picture_is_written_without_the_option(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

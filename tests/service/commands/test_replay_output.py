@@ -54,6 +54,13 @@ def test_a_file_that_cannot_be_written_is_an_error_before_the_engine_runs(
     assert "engine" not in ended.out
 
 
+def test_each_pose_has_its_height_and_where_it_comes_from(tmp_path: Path) -> None:
+    assert call(write_square(tmp_path), "--anchor=A", "--tag-height=1.25", "--out", tmp_path / "poses.csv").status == 0
+    last = read_rows(tmp_path / "poses.csv")[-1]
+    assert (last["z"], last["z_source"]) == ("1.250000", "told")
+    assert float(last["z_std"]) >= 0.0
+
+
 def test_there_is_no_progress_bar_where_nobody_watches(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "dropanchor_service", "replay", str(write_square(tmp_path)), "--anchor=A"]
     ended = subprocess.run(command, capture_output=True, text=True, env=os.environ | environment(), check=True)

@@ -50,9 +50,10 @@ def test_accelerations_in_g_are_named_and_the_told_unit_mends_them(
     folder = changed(tmp_path, run, "imu", ACC, lambda value: value / GRAVITY)
     assert {pose["state"] for pose in poses(folder)} == {"initialising"}
     assert "The accelerations look like g, not m/s²" in capsys.readouterr().out
-    told = poses(folder, "--acc-unit", "g")
-    assert "tracking" in {pose["state"] for pose in told}
-    assert "look like g" not in capsys.readouterr().out
+    (tmp_path / "yard.toml").write_text('[tag_defaults]\nacc_unit = "g"\n')
+    for options in (["--acc-unit", "g"], ["--config", str(tmp_path / "yard.toml")]):
+        assert "tracking" in {pose["state"] for pose in poses(folder, *options)}
+        assert "look like g" not in capsys.readouterr().out
 
 
 def test_what_shows_late_in_a_recording_of_averaged_ranges_holds_from_its_start(

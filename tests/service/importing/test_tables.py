@@ -220,3 +220,11 @@ def test_the_axes_of_the_imu_can_be_turned(run: Import) -> None:
     run.file("s/uwb.csv", PLAIN)
     ended = run(run.folder / "s", "--forward=-y", "--up", "z")
     assert [ended.column("imu", axis)[0] for axis in ("ax", "ay", "az")] == [-2, 1, 9.81]
+
+
+@pytest.mark.parametrize("column", ["time", "time_of_day"])
+def test_times_of_day_go_on_behind_midnight(run: Import, column: str) -> None:
+    ended = run(run.file("uwb.csv", f"{column},anchor,range\n23:59:59.5,A,5\n23:59:59.9,A,6\n0:00:00.3,A,7\n"))
+    assert ended.status == 0, ended.error
+    assert ended.column("range", "t_s") == pytest.approx([0.5, 0.9, 1.3])
+    assert f"{column} is a time of day, 1 times past midnight" in ended.printed

@@ -55,12 +55,15 @@ def test_a_counter_that_wraps_is_unwrapped_and_the_line_is_named() -> None:
         ("2025-10-09 08:53:20.5", UTC_NS + S // 2, False),
         ("2025-10-09T10:53:20,123456789+02:00", UTC_NS + 123_456_789, True),
         ("2025-10-09T08:53:20.000001Z", UTC_NS + 1000, True),
+        ("13:45:07.123", 49_507_123_000_000, False),  # times of day
+        ("9:05:07,5", 32_707_500_000_000, False),
+        ("23:59", 86_340 * S, False),
     ],
 )
 def test_iso_8601_is_read_to_the_nanosecond(text: str, ns: int, has_zone: bool) -> None:
     assert iso_ns(text) == (ns, has_zone)
 
 
-@pytest.mark.parametrize("text", ["hello", "12.5", "-3", "2025-13-09T08:53:20Z", "2025-10"])
+@pytest.mark.parametrize("text", ["hello", "12.5", "-3", "2025-13-09T08:53:20Z", "2025-10", "25:00:00", "12:5:3"])
 def test_other_texts_are_no_times(text: str) -> None:
     assert iso_ns(text) is None

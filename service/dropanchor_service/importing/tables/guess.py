@@ -41,6 +41,7 @@ _TIMES_WITH_UNIT = {
 }
 _OF_TIMES = {"header", "field", "unix", "utc", "sensor", "system", "sys", "device", "host", "since", "start", "boot"}
 _OF_TIMES |= {"log", "elapsed", "local", "gps", "imu", "uwb", "recv", "received", "sample", "of", "iso", "monotonic"}
+_OF_TIMES |= {"day"}
 _NANOSECONDS = {"nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"}
 _RANGES = {"range", "ranges", "dist", "distance", "distances", "d", "r", "uwb", "tof", "twr", "measured", "measurement"}
 _RANGES |= {"rng", "slant", "ranging", "value"}

@@ -32,7 +32,7 @@ from dropanchor_service.importing.tables.mapping import (
     resolved,
 )
 from dropanchor_service.importing.tables.table import Table, number, text_of
-from dropanchor_service.importing.tables.times import Times, times_of
+from dropanchor_service.importing.tables.times import Times, past_midnight, times_of
 from dropanchor_service.importing.tables.units import SI, conversion
 from dropanchor_tag_client.recording.recording import Rows
 
@@ -103,9 +103,13 @@ def _times(found: Collected, fields: Fields) -> Times:
         unit = column.unit or ("s" if T_NSEC in fields else None)
         times = times_of(found.times, unit, column.name, found.lines)
     else:
-        notes = [f"{column.name} is ISO 8601" + (" without a time zone: taken for UTC" if found.zoneless else "")]
-        times = times_of(found.times, "ns", column.name, found.lines)
-        times = times._replace(notes=notes + times.notes)
+        note, t_ns = f"{column.name} is ISO 8601", found.times
+        note += " without a time zone: taken for UTC" if found.zoneless else ""
+        if of_day := past_midnight(found.times):
+            t_ns, midnights = of_day
+            note = f"{column.name} is a time of day" + (f", {midnights} times past midnight" if midnights else "")
+        times = times_of(t_ns, "ns", column.name, found.lines)
+        times = times._replace(notes=[note, *times.notes])
     return times._replace(t_ns=times.t_ns + np.clip(found.seconds, 0, NS_PER_S)) if found.seconds else times
 
 

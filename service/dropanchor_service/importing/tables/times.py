@@ -1,5 +1,6 @@
 """Times of a column as ns: their unit, wrapped counters, ISO 8601."""
 
+import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import NamedTuple
@@ -17,6 +18,8 @@ _USUAL_HZ = 50.0
 _PLAUSIBLE_HZ = (0.2, 20_000.0)
 _UNITS = ("s", "ms", "us", "ns")
 _WRAP = 2**32
+DAY_NS = 86_400 * NS_PER_S
+_OF_DAY = re.compile(r"\s*\d{1,2}:\d{2}(:\d{2}|\s*$)")
 
 
 class Times(NamedTuple):
@@ -47,8 +50,10 @@ _NAMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nan
 def iso_ns(text: str) -> tuple[int, bool] | None:
     """Return the time of a text in ISO 8601 and whether it names its time zone; None if it is none.
 
-    A time without a zone is taken for UTC.
+    A time without a zone is taken for UTC, and a time of day for that of the first day of 1970.
     """
+    if _OF_DAY.match(text):
+        text = f"1970-01-01T{'0' if text.strip()[1] == ':' else ''}{text.strip()}"
     if len(text) < 10 or text[4:5] not in "-0123456789" or not ("-" in text[1:] or "T" in text):
         return None
     whole, point, rest = text.strip().replace(",", ".").partition(".")
@@ -62,6 +67,15 @@ def iso_ns(text: str) -> tuple[int, bool] | None:
         moment = moment.replace(tzinfo=UTC)
     seconds = round((moment.replace(microsecond=0)).timestamp())
     return seconds * NS_PER_S + int((digits + "0" * 9)[:9]), has_zone
+
+
+def past_midnight(times_ns: Sequence[Exact]) -> tuple[list[Exact], int] | None:
+    """Return times of day that go on behind midnight, ns, and how often it was midnight; None for times with a date."""
+    if max(times_ns) >= DAY_NS:
+        return None
+    t_ns = np.asarray(times_ns, np.int64)
+    days = np.concatenate([[0], np.cumsum(np.diff(t_ns) < -DAY_NS // 2)])
+    return (t_ns + days * DAY_NS).tolist(), int(days[-1])
 
 
 def _unwrapped(raw: Sequence[Exact]) -> tuple[Sequence[Exact], list[int]]:
