@@ -102,7 +102,7 @@ class Checked(NamedTuple):
 
 def cut(imu: Array, ranges: Array, step_s: float) -> Iterator[SampleBatch]:
     """Yield the samples as messages would bring them, each of `step_s`."""
-    begin, end = int(imu["t_ns"][0]), int(max(imu["t_ns"][-1], ranges["t_ns"][-1]))
+    begin, end = int(imu["t_ns"][0]), max(int(samples["t_ns"][-1]) for samples in (imu, ranges) if len(samples))
     edges = np.arange(begin, end + 2 * round(step_s * 1e9), round(step_s * 1e9))
     of_imu, of_ranges = np.searchsorted(imu["t_ns"], edges), np.searchsorted(ranges["t_ns"], edges)
     for i in range(len(edges) - 1):

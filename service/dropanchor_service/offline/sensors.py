@@ -1,5 +1,6 @@
 """Check the sensors of a recording as those of a live tag are checked, and a little better: the end is known, too."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -46,12 +47,13 @@ class CheckedEngine:
     def process(self, samples: SampleBatch) -> PoseBatch:
         """Fuse the samples that may be used. A tag whose sensors fail has poses without a position."""
         checked = self._check.check(samples)
+        self._note(samples, self._check.unjudged(0))
         made = self._engine.process(checked.samples)
         self._check.mark(made.poses)
         for row in checked.failed.tolist():
             self._engine.configure(row, self._without_start())
         if len(checked.found):
-            self._note(samples)
+            self._note(samples, self._check.findings(0))
             left_out = np.concatenate(checked.left_out)
             rejected = made.rejected | ({Reason.SENSOR_FAULT: left_out} if len(left_out) else {})
             return replace(made, poses=np.concatenate([made.poses, checked.poses]), rejected=rejected)
@@ -67,9 +69,9 @@ class CheckedEngine:
         settings["start_known"] = False
         return settings
 
-    def _note(self, samples: SampleBatch) -> None:
+    def _note(self, samples: SampleBatch, findings: Sequence[Finding]) -> None:
         t_s = min(int(column["t_ns"][0]) for column in samples.columns() if len(column)) / NS_PER_S
-        for finding in self._check.findings(0):
+        for finding in findings:
             since_s = self.found.get(finding.name, (t_s, finding))[0]
             self.found[finding.name] = since_s, finding
 

@@ -9,7 +9,7 @@ from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.plausibility.imu import add_absurd, add_imu
 from dropanchor_service.estimation.plausibility.layout import CHECK, DOUBTS, Check, make_checks
 from dropanchor_service.estimation.plausibility.ranges import AVERAGED, add_absurd_range, add_range
-from dropanchor_service.estimation.plausibility.verdicts import Finding, findings
+from dropanchor_service.estimation.plausibility.verdicts import VIGOROUS, Finding, ImuVerdict, findings
 
 AVERAGED_STD = 0.3  # m, of a mean of ranges: its errors are not independent, so that each counts less
 
@@ -62,6 +62,12 @@ class SensorCheck:
     def findings(self, row: int) -> list[Finding]:
         """Return what is wrong with the sensors of this row."""
         return findings(self._checks[row])
+
+    def unjudged(self, row: int) -> list[Finding]:
+        """Return why the sensors of this row, of which nothing wrong is known, are not judged now."""
+        check = self._checks[row]
+        is_vigorous = check["imu_verdict"] == ImuVerdict.GOOD and check["right_s"] < 0.0
+        return [VIGOROUS] if is_vigorous else []
 
     def note_absurd(self, imu_rows: Array, imu_sizes: Array, range_rows: Array) -> None:
         """Note samples that no sensor can have measured. imu_sizes: the greatest value of each."""

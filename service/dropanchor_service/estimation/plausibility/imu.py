@@ -11,12 +11,19 @@ from dropanchor_service.estimation.plausibility.turning import judge_field, judg
 from dropanchor_service.estimation.plausibility.vectors import Vector, combined, norm
 from dropanchor_service.estimation.plausibility.verdicts import ImuVerdict
 
+G: Final = 9.80665  # m/s²
 BLOCK_NS: Final = 500_000_000
 GAP_NS: Final = 1_000_000_000  # after which a block begins anew
 APART_S: Final = 0.9  # between the middles of two blocks that are compared
 MOVED: Final = 0.15  # m/s², between two blocks: no tag at rest shows that
 MOVED_BLOCKS: Final = 6
+VIGOROUS: Final = 8.5  # m/s², between two blocks
+NEAR_G: Final = 3.0  # m/s², beyond which half of that is vigorous
+FARTHEST: Final = 17.0  # m/s², of a mean: beyond, it is another unit or scale
+MODERATE_S: Final = 3.0  # without vigorous motion, before an IMU is judged again
 ABSURD_IN_A_ROW: Final = 20
+ACC_SCALE, AXES_DIFFER = int(ImuVerdict.ACC_SCALE), int(ImuVerdict.AXES_DIFFER)
+GYRO_IN_DEG = int(ImuVerdict.GYRO_IN_DEG)
 GYRO_STUCK, RAW_COUNTS = int(ImuVerdict.GYRO_STUCK), int(ImuVerdict.RAW_COUNTS)
 
 
@@ -131,17 +138,50 @@ def _end_block(c: Check, seconds: float) -> None:
 
 @njit(nogil=True)
 def _judge(c: Check, acc: Vector, gyro: Vector, mag: Vector, has_mag: bool, seconds: float, apart: float) -> None:
-    """Give each of the judges its turn. The first fault stays until the judge who found it takes it back."""
-    _settle(c, judge_gravity(c, acc, seconds, repeated_s(c, c.acc_ns), repeated_s(c, c.gyro_ns)))
+    """Give each of the judges its turn. The first fault stays until the judge who found it takes it back.
+
+    Vigorous motion, such as the figure of eight that calibrates a compass, is not judged: within half a second it turns
+    to and fro, and what is not gravity is as large as gravity.
+    """
     follows = c.before.n > 0 and apart < APART_S
+    if follows:
+        _settle(c, _judge_gyro_alive(c, acc))
+        if _is_vigorous(c, acc):
+            _suspend(c)
+    if c.right_s < 0.0:
+        c.right_s = min(0.0, c.right_s + seconds)
+        return
+    _settle(c, judge_gravity(c, acc, seconds, repeated_s(c, c.acc_ns), repeated_s(c, c.gyro_ns)))
     if c.imu_verdict == RAW_COUNTS:
         _settle(c, GOOD)
     if follows:
-        _settle(c, _judge_gyro_alive(c, acc))
         _settle(c, judge_turning(c, acc, gyro, c.n, seconds, apart))
         if has_mag and math.isfinite(c.before.mag[0]):
             _settle(c, judge_field(c, gyro, mag, apart))
     _settle(c, judge_sign(c, acc, gyro, mag, has_mag, seconds))
+
+
+@njit(nogil=True)
+def _is_vigorous(c: Check, acc: Vector) -> bool:
+    """Return whether the mean acceleration differs from that of the block before as only swinging makes it differ."""
+    before: Vector = (c.before.acc[0], c.before.acc[1], c.before.acc[2])
+    length, change = norm(acc), norm(combined(acc, 1.0, before, -1.0))
+    if max(length, norm(before)) > FARTHEST:
+        return False
+    return change > VIGOROUS or (change > 0.5 * VIGOROUS and abs(length - G) > NEAR_G)
+
+
+@njit(nogil=True)
+def _suspend(c: Check) -> None:
+    """Judge no more until the motion is moderate. What its first half second has shown, counts no more either."""
+    fresh = 0.0 <= c.right_s < MODERATE_S
+    if c.right_s >= 0.0:
+        _forget(c)
+    if c.imu_verdict == ACC_SCALE or (fresh and c.imu_verdict in (AXES_DIFFER, GYRO_IN_DEG)):
+        _settle(c, GOOD)
+        c.known_s = 0.0
+    c.right_s = -MODERATE_S
+    c.calm_ns = 0
 
 
 @njit(nogil=True)
@@ -163,15 +203,25 @@ def _settle(c: Check, verdict: int) -> None:
     if verdict == c.imu_verdict:
         return
     if may_be_used(verdict) != may_be_used(c.imu_verdict):
-        c.tilted = c.contradicted = c.turned = c.peak = c.doubted_s = 0.0
         c.upside_s = c.upside_s if verdict != GOOD else 0.0
-        c.dip_s = c.left = c.left_rate = 0.0
-        c.moved = c.field_blocks = 0
-        c.field2 = 0.0
-        for i in range(3):
-            c.rates[i] = 0.0
-        for i in range(4):
-            c.told[i] = 0.0
-            for j in range(4):
-                c.normal[i, j] = 0.0
+        c.dip_s = 0.0
+        c.moved = 0
+        _forget(c)
+    if verdict in (AXES_DIFFER, GYRO_IN_DEG):
+        c.right_s = 0.0  # since when it holds
     c.imu_verdict = verdict
+
+
+@njit(nogil=True)
+def _forget(c: Check) -> None:
+    """Begin anew with what turns show."""
+    c.tilted = c.contradicted = c.turned = c.peak = c.doubted_s = 0.0
+    c.left = c.left_rate = 0.0
+    c.field_blocks = 0
+    c.field2 = 0.0
+    for i in range(3):
+        c.rates[i] = 0.0
+    for i in range(4):
+        c.told[i] = 0.0
+        for j in range(4):
+            c.normal[i, j] = 0.0

@@ -43,7 +43,7 @@ CHECK = np.dtype(
         # gravity
         ("known_s", "f4"),  # of blocks so far
         ("wrong_s", "f4"),  # of the last blocks without gravity
-        ("right_s", "f4"),
+        ("right_s", "f4"),  # of the last blocks with gravity; negative: until an IMU is judged after vigorous motion
         ("norm", "f4"),  # m/s², slow mean of |mean acceleration|
         ("level", "f4", 3),  # m/s², slow mean of the acceleration
         ("moved", "i4"),  # blocks with motion since the gyroscope changed

@@ -12,12 +12,12 @@ STEP_NS = 1_000_000_000
 
 
 def findings_of(samples: SampleBatch) -> list[Finding]:
-    """Return what the check finds in the samples of row 0, in order of time."""
+    """Return what the check finds in the samples of row 0, in order of time, and whether it could not judge all."""
     check, found = SensorCheck(), dict[str, Finding]()
     check.start(0)
     for batch in in_steps(samples):
         check.check(batch)
-        found |= {finding.name: finding for finding in check.findings(0)}
+        found |= {finding.name: finding for finding in (*check.findings(0), *check.unjudged(0))}
     return list(found.values())
 
 

@@ -98,6 +98,12 @@ SENTENCES = {verdict.name.lower(): text for verdict, text in IMU_SENTENCES.items
 """The sentence of every finding, by its name; {number} stands for a number or an axis."""
 
 
+VIGOROUS = Finding(
+    "vigorous_motion", "Vigorous motion, as when a compass is calibrated: units and axes are not judged in it."
+)
+"""Said of a recording alone: nothing is wrong."""
+
+
 def findings(check: Array) -> list[Finding]:
     """Return what is wrong with a tag. check: CHECK (0-d)."""
     found = []
