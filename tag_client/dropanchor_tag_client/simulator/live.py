@@ -9,13 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_schemas.wire import ImuSample, RangeSample, Vector, anchor_number
+from dropanchor_schemas.wire import BearingSample, ImuSample, RangeSample, Vector, anchor_number
+from dropanchor_tag_client.simulator.azimuth import Azimuths
 from dropanchor_tag_client.simulator.imu import Imu, draw_unit
 from dropanchor_tag_client.simulator.noise import Stream, stream
 from dropanchor_tag_client.simulator.ranging import AnchorPlace, Ranges
 from dropanchor_tag_client.simulator.scenarios import trajectory
 from dropanchor_tag_client.simulator.sensors import SensorModels
-from dropanchor_tag_client.simulator.simulation import Simulation, observe, simulate
+from dropanchor_tag_client.simulator.simulation import Simulation, measured_azimuths, observe, simulate
 from dropanchor_tag_client.simulator.trajectory import Array, Trajectory, joined
 from dropanchor_tag_client.simulator.wander import HABITS, Wanderer
 
@@ -39,11 +40,13 @@ class Delivery(NamedTuple):
     tag: int
     imu: list[ImuSample]
     ranges: list[RangeSample]
+    bearings: list[BearingSample]
 
 
 class _Stretch(NamedTuple):
     imu: Imu
     ranges: Ranges
+    azimuths: Azimuths | None
 
 
 def tag_name(index: int) -> str:
@@ -138,34 +141,37 @@ def _in_a_scenario(scenario: str, seed: int, models: SensorModels) -> Iterator[_
         motion = motion.after_rest(REST_BEFORE_S)
     hz = models.imu.hz or 1.0 / motion.dt
     run = observe(scenario, seed, motion.at(np.arange(0.0, float(motion.t[-1]) + 1e-9, 1.0 / hz)), models)
-    yield _Stretch(run.imu, run.ranges)
+    yield _Stretch(run.imu, run.ranges, run.azimuths)
 
 
 def _in_the_yard(seed: int, index: int, models: SensorModels) -> Iterator[_Stretch]:
     own = _tag_seed(seed, index)
     unit = draw_unit(models.imu, models.mount_rad, stream(own, Stream.IMU_UNIT))
-    imu_rng, range_rng = stream(own, Stream.IMU), stream(own, Stream.RANGE)
+    imu_rng, range_rng, azimuth_rng = (stream(own, use) for use in (Stream.IMU, Stream.RANGE, Stream.AZIMUTH))
     ranging = models.ranges if models.ranges.hz else replace(models.ranges, hz=YARD_IMU_HZ)
     for motion in _wanderer(seed, index, models.imu.hz or YARD_IMU_HZ).motions():
         error = models.heading_error.draw(motion, imu_rng)
         ranges = ranging.measure(motion, models.height_m, models.anchors, range_rng)
-        new = ranges.t_s > float(motion.t[0]) + 1e-6
-        yield _Stretch(unit.measure(motion, imu_rng, error), ranges.where(new & (ranges.t_s > -1e-6)))
+        new = ranges.where((ranges.t_s > float(motion.t[0]) + 1e-6) & (ranges.t_s > -1e-6))
+        azimuths = measured_azimuths(models, motion, new, azimuth_rng)
+        yield _Stretch(unit.measure(motion, imu_rng, error), new, azimuths)
 
 
 def _bundles(
     tag: int, stretches: Iterator[_Stretch], anchors: Sequence[AnchorPlace], t0_ns: int, step_s: float
 ) -> Iterator[Delivery]:
     numbers = [anchor_number(anchor.id) for anchor in anchors]
-    for imu, ranges in stretches:
+    for imu, ranges, azimuths in stretches:
         first, last = imu.t_s[0], max(imu.t_s[-1], ranges.t_s.max(initial=0.0))
         edges = np.arange(np.floor(first / step_s) + 1, np.ceil(last / step_s) + 2) * step_s
         samples, measured = iter(_imu_samples(imu, t0_ns)), iter(_range_samples(ranges, numbers, t0_ns))
-        imu_counts, range_counts = _counts(imu.t_s, edges), _counts(ranges.t_s, edges)
-        for edge, n_imu, n_ranges in zip(edges.tolist(), imu_counts, range_counts, strict=True):
-            bundle = Delivery(min(edge, float(last)), tag, [*islice(samples, n_imu)], [*islice(measured, n_ranges)])
+        directions = iter(_bearing_samples(azimuths, numbers, t0_ns))
+        of_azimuths = np.empty(0) if azimuths is None else azimuths.t_s
+        counts = zip(edges.tolist(), *(_counts(t_s, edges) for t_s in (imu.t_s, ranges.t_s, of_azimuths)), strict=True)
+        for edge, n_imu, n_ranges, n_azimuths in counts:
+            taken = [*islice(samples, n_imu)], [*islice(measured, n_ranges)], [*islice(directions, n_azimuths)]
             if n_imu or n_ranges:
-                yield bundle
+                yield Delivery(min(edge, float(last)), tag, *taken)
 
 
 def _counts(times: Array, edges: Array) -> list[int]:
@@ -183,6 +189,14 @@ def _range_samples(ranges: Ranges, numbers: Sequence[int], t0_ns: int) -> Iterat
     columns = (ranges.anchor.tolist(), ranges.range_m.tolist(), ranges.std_m.tolist())
     for t_ns, anchor, range_m, std_m in zip(_times_ns(ranges.t_s, t0_ns), *columns, strict=True):
         yield RangeSample(t_ns, numbers[anchor], range_m, std_m)
+
+
+def _bearing_samples(azimuths: Azimuths | None, numbers: Sequence[int], t0_ns: int) -> Iterator[BearingSample]:
+    if azimuths is None:
+        return
+    columns = (column.tolist() for column in azimuths[1:])
+    for t_ns, anchor, azimuth_rad, std_rad in zip(_times_ns(azimuths.t_s, t0_ns), *columns, strict=True):
+        yield BearingSample(t_ns, numbers[anchor], azimuth_rad, std_rad)
 
 
 def _times_ns(times: Array, t0_ns: int) -> list[int]:

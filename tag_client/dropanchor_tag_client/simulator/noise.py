@@ -19,6 +19,7 @@ class Stream(IntEnum):
     HEADING_ERROR = 5
     GAIT = 6
     NLOS = 7
+    AZIMUTH = 8
 
 
 def stream(seed: int, use: Stream, index: int = 0) -> np.random.Generator:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
+from dropanchor_tag_client.simulator.azimuth import AzimuthModel
 from dropanchor_tag_client.simulator.heading_error import HeadingErrorModel
 from dropanchor_tag_client.simulator.imu import ImuModel
 from dropanchor_tag_client.simulator.ranging import AnchorPlace, RangeModel
@@ -12,7 +13,7 @@ from dropanchor_tag_client.simulator.scalar import ScalarModel
 
 @dataclass(frozen=True)
 class SensorModels:
-    """All sensors of a tag.
+    """All sensors of a tag. azimuth: of its anchors; None: they measure none.
 
     mount_rad: course minus body yaw. height_m: height of the tag on the anchors' z axis. first_seen_s: time between the
     first motion and the first sample; None: the samples start with the run.
@@ -22,6 +23,7 @@ class SensorModels:
     scalar: ScalarModel = field(default_factory=ScalarModel)
     imu: ImuModel = field(default_factory=ImuModel)
     heading_error: HeadingErrorModel = field(default_factory=HeadingErrorModel)
+    azimuth: AzimuthModel | None = None
     anchors: tuple[AnchorPlace, ...] = (AnchorPlace(),)
     mount_rad: float = 0.0
     height_m: float = 0.0

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dropanchor_tag_client.simulator.azimuth import Azimuths
 from dropanchor_tag_client.simulator.imu import GRAVITY, Attitude, Imu, ImuUnit, draw_unit, quaternions, turned
 from dropanchor_tag_client.simulator.noise import Stream, stream
 from dropanchor_tag_client.simulator.ranging import AnchorPlace, Ranges, sample_times
@@ -37,7 +38,7 @@ class Simulation:
     """Truth and samples of a run. Times are in s from the start of the motion.
 
     imu: raw 9-axis samples. scalars: heading, yaw rate and forward acceleration with independent noise. truth, imu and
-    scalars share their instants; ranges have their own.
+    scalars share their instants; ranges have their own. azimuths: None where the anchors measure none.
     """
 
     scenario: str
@@ -47,6 +48,7 @@ class Simulation:
     imu: Imu
     ranges: Ranges
     scalars: Scalars
+    azimuths: Azimuths | None = None
 
     def level_imu(self) -> Imu:
         """Return the scalar samples as those of a level IMU without a magnetometer (NaN).
@@ -90,6 +92,7 @@ def observe(scenario: str, seed: int, motion: Trajectory, models: SensorModels) 
     if np.count_nonzero(kept) < 2:
         raise ValueError(f"there are no samples: the tag is first seen at {seen:.1f} s, after the end of the motion")
     ranges = models.ranges.measure(motion, models.height_m, models.anchors, stream(seed, Stream.RANGE))
+    received = ranges.where(ranges.t_s >= seen)
     scalars = models.scalar.measure(motion, models.mount_rad, error, stream(seed, Stream.SCALAR))
     before = with_row_before(motion)
     imu = unit.measure(before, stream(seed, Stream.IMU), np.concatenate([error[:1], error]))
@@ -99,9 +102,17 @@ def observe(scenario: str, seed: int, motion: Trajectory, models: SensorModels) 
         anchors=models.anchors,
         truth=Truth(*(column[kept] for column in truth_of(motion, unit, models.height_m))),
         imu=Imu(*(column[kept] for column in imu)),
-        ranges=ranges.where(ranges.t_s >= seen),
+        ranges=received,
         scalars=Scalars(*(column[kept] for column in scalars)),
+        azimuths=measured_azimuths(models, motion, received, stream(seed, Stream.AZIMUTH)),
     )
+
+
+def measured_azimuths(
+    models: SensorModels, motion: Trajectory, ranges: Ranges, rng: np.random.Generator
+) -> Azimuths | None:
+    """Return the azimuths that come with these ranges, None where the anchors measure none."""
+    return None if models.azimuth is None else models.azimuth.measure(motion, ranges, models.anchors, rng)
 
 
 def truth_of(motion: Trajectory, unit: ImuUnit, height: float) -> Truth:

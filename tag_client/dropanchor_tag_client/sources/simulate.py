@@ -1,6 +1,7 @@
 """Simulated tags that drive around one anchor: published live, or written as recordings."""
 
 import argparse
+import math
 import sys
 import time
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ from pathlib import Path
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.host import program
 from dropanchor_tag_client.options import add_connection_options, is_received, opened_session
+from dropanchor_tag_client.simulator.azimuth import AzimuthModel
 from dropanchor_tag_client.simulator.live import YARD, Delivery, deliveries, simulation, tag_name
 from dropanchor_tag_client.simulator.perturbations import PERTURBATIONS, perturbed
 from dropanchor_tag_client.simulator.ranging import AnchorPlace
@@ -43,6 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--range-hz", type=_positive, metavar="HZ", help="ranges per second (default: as --noise says)")
     group.add_argument("--imu-hz", type=_positive, metavar="HZ", help="IMU samples per second (default: 100)")
     group.add_argument("--anchor", default="1", metavar="ID", help="id of the anchor (default: %(default)s)")
+    group.add_argument(
+        "--azimuth", type=_positive, metavar="DEG", help="the anchor measures azimuths, too, with this error"
+    )
     group.add_argument("--duration", type=_positive, metavar="S", help="end after so long")
     group.add_argument(
         "--out",
@@ -63,7 +68,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def sensors(arguments: argparse.Namespace) -> SensorModels:
     models = preset(arguments.noise, arguments.range_hz, arguments.imu_hz)
-    return perturbed(replace(models, anchors=(AnchorPlace(arguments.anchor),)), *arguments.perturb)
+    azimuth = None if arguments.azimuth is None else AzimuthModel(math.radians(arguments.azimuth))
+    return perturbed(replace(models, anchors=(AnchorPlace(arguments.anchor),), azimuth=azimuth), *arguments.perturb)
 
 
 def _write(arguments: argparse.Namespace, models: SensorModels) -> int:
@@ -111,6 +117,8 @@ def send(client: TagClient, delivery: Delivery) -> None:
         client.publish_imu(acc, gyro, mag, t_ns=t_ns)
     for measured in delivery.ranges:
         client.publish_range(measured.anchor, measured.range_m, t_ns=measured.t_ns, std_m=measured.std_m)
+    for t_ns, anchor, bearing_rad, std_rad in delivery.bearings:
+        client.publish_bearing(anchor, bearing_rad, t_ns=t_ns, std_rad=std_rad)
     client.flush()
 
 
