@@ -76,6 +76,12 @@ class Anchor(_Settings):
     x: Number = Field(default=0.0, description="Position along the site's x axis.")
     y: Number = Field(default=0.0, description="Position along the site's y axis.")
     z: Number = Field(default=0.0, description="Height above the plane from which tag heights are measured.")
+    facing_rad: Number | None = Field(
+        default=None,
+        description="Where an anchor that measures azimuths faces, counter-clockwise from the site's x axis. It is "
+        "added to the bearings of its tags, and these tell where a tag starts: no tag may be behind an anchor that "
+        "cannot tell behind from ahead. null: bearings are of the site already.",
+    )
 
     @property
     def number(self) -> int:

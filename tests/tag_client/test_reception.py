@@ -16,7 +16,7 @@ from dropanchor_tag_client.session import SharedSession, open_session
 from dropanchor_tag_client.sources.axes import mounting
 from dropanchor_tag_client.sources.bridge.measurement import Drop, Measurement, Received
 from dropanchor_tag_client.sources.bridge.pipe import Bridge
-from dropanchor_tag_client.sources.modules.outlet import ManyTags
+from dropanchor_tag_client.sources.modules.outlet import Azimuth, ManyTags
 from dropanchor_tag_client.sources.modules.report import Range, Report
 from dropanchor_tag_client.sources.modules.status_log import StatusLog
 from support.patience import PATIENCE_S
@@ -94,7 +94,7 @@ def test_a_client_in_python_refuses_the_certificate_of_another_tag(has_folder: b
 
 def through_a_module(options: dict[str, object]) -> str:
     log = StatusLog()
-    outlet = ManyTags("", options, None, {}, mounting("x", "z"), log)
+    outlet = ManyTags("", options, None, {}, mounting("x", "z"), log, Azimuth())
     outlet.publish(Report((Range("1", 3.5, tag="two"),)), 1_760_000_000_000_000_000)
     outlet.close()
     return "; ".join(log._pending)

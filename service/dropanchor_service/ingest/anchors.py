@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from dropanchor_schemas.site import Anchor
 from dropanchor_service.estimation.columns import ANCHOR, Array
 from dropanchor_service.settings.engine_columns import anchor_columns
 from dropanchor_service.store import ServedSite
@@ -14,8 +15,8 @@ _NUMBER_BITS = 32  # of an anchor number
 class AnchorTable:
     """An index keeps its meaning for the life of the table. Owned by one thread.
 
-    places: ANCHOR, of every anchor that a site has or had. sites: index of the site of each. With one site, an index is
-    the one that its store gives the anchor.
+    places: ANCHOR, of every anchor that a site has or had. facings: rad, NaN: not told. sites: index of the site of
+    each. With one site, an index is the one that its store gives the anchor.
     """
 
     def __init__(self) -> None:
@@ -23,6 +24,7 @@ class AnchorTable:
 
     def _clear(self) -> None:
         self.places = np.zeros(0, ANCHOR)
+        self.facings = np.zeros(0)
         self.sites = np.zeros(0, np.int32)
         self._indices: dict[int, Array] = {}  # by index of the site: where its anchors are, in the order of its store
         self._own = np.full(1, -1, np.int32)  # index within its site of each anchor, and -1 for no anchor
@@ -30,12 +32,14 @@ class AnchorTable:
         self._of_keys = np.zeros(0, np.int32)  # their indices
 
     def follow(self, site: ServedSite) -> bool:
-        """Take over the anchors of a site. Return whether one of them has moved."""
-        places = anchor_columns(site.store.anchors_by_index())
+        """Take over the anchors of a site. Return whether one of them has moved or turned."""
+        anchors = site.store.anchors_by_index()
+        places, facings = anchor_columns(anchors), _facings(anchors)
         known = self._of(site.index)
         moved = bool((places[: len(known)] != self.places[known]).any())
+        moved |= not np.array_equal(facings[: len(known)], self.facings[known], equal_nan=True)
         self._append(np.full(len(places) - len(known), site.index, np.int32))
-        self.places[self._of(site.index)] = places
+        self.places[self._of(site.index)], self.facings[self._of(site.index)] = places, facings
         self._find_by_number(site)
         return moved
 
@@ -73,6 +77,7 @@ class AnchorTable:
             self._indices[site] = np.concatenate([known, begin + new])
         self.sites = np.concatenate([self.sites, sites])
         self.places = np.concatenate([self.places, np.zeros(len(sites), ANCHOR)])
+        self.facings = np.concatenate([self.facings, np.full(len(sites), np.nan)])
         self._own = np.concatenate([self._own[:-1], own, self._own[-1:]])
 
     def _find_by_number(self, site: ServedSite) -> None:
@@ -84,3 +89,7 @@ class AnchorTable:
         keys, indices = np.array([key for key, _ in known], np.int64), np.array([i for _, i in known], np.int32)
         self._keys = np.concatenate([self._keys[:begin], keys, self._keys[end:]])
         self._of_keys = np.concatenate([self._of_keys[:begin], indices, self._of_keys[end:]])
+
+
+def _facings(anchors: Sequence[Anchor]) -> Array:
+    return np.array([np.nan if anchor.facing_rad is None else anchor.facing_rad for anchor in anchors], np.float64)

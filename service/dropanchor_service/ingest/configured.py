@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from dropanchor_schemas.site import TagSettings
+from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.settings.engine_columns import tag_columns
 
@@ -13,6 +13,10 @@ class Configured(NamedTuple):
     tag: TagSettings
     declination_rad: float
     declination_std_rad: float | None
+
+    def with_start(self, start: StartPose | None) -> "Configured":
+        """Return the settings with another start of the tag."""
+        return self._replace(tag=self.tag.model_copy(update={"start": start}))
 
     def columns(self) -> Array:
         """Return TAG_SETTINGS (0-d)."""

@@ -22,6 +22,7 @@ from dropanchor_service.ingest.anchors import AnchorTable
 from dropanchor_service.ingest.configured import Configured
 from dropanchor_service.ingest.decode import Decoded
 from dropanchor_service.ingest.lost_pose import lost_pose
+from dropanchor_service.ingest.measured_starts import MeasuredStarts, with_lasting_errors
 from dropanchor_service.ingest.norths import NorthWatch
 from dropanchor_service.ingest.references import PressureReferences
 from dropanchor_service.ingest.starts import StartWatch
@@ -60,6 +61,7 @@ class GuardedEngine:
         self._faults: dict[int, _Faults] = {}
         self._sensors = SensorCheck()
         self._starts = StartWatch(engine, sites.rows.start_news)
+        self._measured = MeasuredStarts()
         self._norths = NorthWatch(engine, sites.rows.norths)
         self._references = PressureReferences(engine)
         self._heights = ToldHeights()
@@ -175,7 +177,10 @@ class GuardedEngine:
         for row in self._new_rows(samples):
             self._configure(row)
         checked = self._sensors.check(samples)
-        for batch in self._bisected(checked.samples, now_ns) if any(map(len, checked.samples.columns())) else ():
+        for row, start in self._measured.look(checked.samples, self.anchors, self._settings["height"]):
+            self._engine.configure(row, self._configured[row].with_start(start).columns())
+        usable = with_lasting_errors(checked.samples, self.anchors)
+        for batch in self._bisected(usable, now_ns) if any(map(len, usable.columns())) else ():
             self._starts.look(batch)
             self._sensors.mark(batch.poses)
             self._heights.mark(batch.poses)
@@ -254,16 +259,17 @@ class GuardedEngine:
         else:
             self._starts.end(row)
         # After a fault or a restart the tag is no longer where it started.
-        tag = current.tag if start_known else current.tag.model_copy(update={"start": None})
-        self._norths.tell(row, tag)
-        self._engine.configure(row, current._replace(tag=tag).columns())
+        told = current if start_known else current.with_start(None)
+        self._norths.tell(row, told.tag)
+        self._measured.begin(row, is_known=told.tag.start is not None)
+        self._engine.configure(row, told.columns())
         if start_known:
             self._sensors.start(row, current.tag.acc_reversed is not None)
             self._sites.rows.findings.set(row, ())
         self._keep_settings(row, current.columns())
         site = self._sites.of_row(row).index
         others = (other for other in self._configured if other != row and self._sites.of_row(other).index == site)
-        self._references.follow(site, row, tag, others)
+        self._references.follow(site, row, told.tag, others)
 
     def _note(self, row: int, current: Configured) -> None:
         self._configured[row] = current

@@ -7,7 +7,7 @@ from operator import is_
 
 import numpy as np
 
-from dropanchor_schemas.kinds import PRESSURE, SCALARS, Kind, RangeSample
+from dropanchor_schemas.kinds import PRESSURE, SCALARS, BearingSample, Kind, RangeSample
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array, SampleBatch
 from dropanchor_service.ingest.backlog import ARRIVAL, Message
@@ -280,12 +280,13 @@ class SampleReader:
             self._note_unknown_anchors(batch, samples[indices < 0])
             indices = self._indices(batch, samples)
         unknown = indices < 0
-        if not unknown.any():
-            samples["anchor"] = indices
-            return samples
-        kept = keep(samples, unknown, Reason.ANCHOR_UNKNOWN, kind.name, batch.rejected)
-        kept["anchor"] = indices[~unknown]
-        return kept
+        if unknown.any():
+            samples = keep(samples, unknown, Reason.ANCHOR_UNKNOWN, kind.name, batch.rejected)
+            indices = indices[~unknown]
+        samples["anchor"] = indices
+        if kind.sample is BearingSample:
+            samples["value"] += np.nan_to_num(self._engine.anchors.facings[indices])
+        return samples
 
 
 def _if_readable(payload: bytes, encoding: str) -> bytes:

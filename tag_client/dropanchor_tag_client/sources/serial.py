@@ -1,6 +1,7 @@
 """Publish what a UWB module on a serial port reports: a tag, or an anchor that reports several tags."""
 
 import argparse
+import math
 import sys
 import time
 from collections.abc import Iterator
@@ -23,7 +24,7 @@ from dropanchor_tag_client.sources.modules.catalogue import MODULES, SUFFIX
 from dropanchor_tag_client.sources.modules.detect import Arrived
 from dropanchor_tag_client.sources.modules.device_clock import DeviceClock
 from dropanchor_tag_client.sources.modules.module import Module, commands
-from dropanchor_tag_client.sources.modules.outlet import ManyTags, OneTag, Outlet
+from dropanchor_tag_client.sources.modules.outlet import Azimuth, ManyTags, OneTag, Outlet
 from dropanchor_tag_client.sources.modules.reader import Reader
 from dropanchor_tag_client.sources.modules.status_log import StatusLog
 from dropanchor_tag_client.upkeep import Upkeep
@@ -64,6 +65,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--tag-from-id", action="store_true", help="publish each tag that it reports under its own id, after --tag"
     )
     gateway.add_argument("--as-anchor", metavar="NAME", help="the module is this anchor, what it names are tags")
+    gateway.add_argument(
+        "--azimuth-std", type=float, default=10.0, metavar="DEG", help="error of its azimuths (default: %(default)s)"
+    )
+    gateway.add_argument("--mirrored", action="store_true", help="its azimuths go the other way: it hangs upside down")
     imu = parser.add_argument_group("how its IMU is mounted")
     imu.add_argument(
         "--forward", choices=AXES, default="x", help="the axis that points forward; --forward=-y (default: %(default)s)"
@@ -117,7 +122,8 @@ def _outlet(arguments: argparse.Namespace, log: StatusLog) -> Iterator[Outlet]:
         session = stack.enter_context(opened_session(arguments))
         options = {"site": arguments.site, "connect": session, "encoding": arguments.encoding, "batch_s": None}
         options |= spool_settings(arguments)
-        many = ManyTags(arguments.tag or "", options, arguments.as_anchor, names, mounted, log)
+        azimuth = Azimuth(math.radians(arguments.azimuth_std), arguments.mirrored)
+        many = ManyTags(arguments.tag or "", options, arguments.as_anchor, names, mounted, log, azimuth)
         stack.callback(many.close)
         stack.enter_context(Upkeep(many.clients))
         yield many
@@ -153,5 +159,7 @@ def _check(arguments: argparse.Namespace) -> None:
         raise ValueError("whose ranges are these? --tag says so, or --credentials, or --tag-from-id")
     if arguments.as_anchor is not None and not arguments.tag_from_id:
         raise ValueError("--as-anchor needs --tag-from-id")
+    if not 0.0 < arguments.azimuth_std < 180.0:
+        raise ValueError("--azimuth-std is an angle in degrees, such as 5")
     mounting(arguments.forward, arguments.up)
     anchor_names(arguments)

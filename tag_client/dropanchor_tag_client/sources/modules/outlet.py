@@ -1,7 +1,8 @@
 """Publish the reports of a module: as one tag, or as every tag that the module names."""
 
+import math
 from collections.abc import Iterable, Mapping
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_tag_client.client import TagClient
@@ -19,12 +20,20 @@ class Outlet(Protocol):
     def flush(self) -> None: ...
 
 
+class Azimuth(NamedTuple):
+    """How to take the azimuths of a module. is_mirrored: left is right, as when it hangs upside down."""
+
+    std_rad: float = math.radians(10.0)
+    is_mirrored: bool = False
+
+
 class Samples:
     """Publish ranges and IMU samples under the names and in the axes of the site."""
 
-    def __init__(self, names: Mapping[str, str], mounted: Mounting, log: StatusLog) -> None:
+    def __init__(self, names: Mapping[str, str], mounted: Mounting, log: StatusLog, azimuth: Azimuth) -> None:
         self._names = names
         self._mounted = mounted
+        self._azimuth = azimuth
         self._log = log
         self._anchors: set[str] = set()
         self._up_axis: UpAxis | None = UpAxis()
@@ -36,6 +45,13 @@ class Samples:
         if str(name) not in self._anchors and len(self._anchors) < MAX_TAGS:
             self._anchors.add(str(name))
             self._log.add(f'tag "{client.tag}": anchor "{name}"{_number(str(name))} at {one.range_m:.2f} m')
+
+    def azimuth(self, client: TagClient, anchor: str, one: Range, t_ns: int) -> None:
+        """Publish the azimuth that the anchor has measured, if it has."""
+        if not math.isnan(one.azimuth_rad):
+            bearing_rad = -one.azimuth_rad if self._azimuth.is_mirrored else one.azimuth_rad
+            name = self._names.get(anchor, anchor)
+            client.publish_bearing(name, bearing_rad, t_ns=t_ns, std_rad=self._azimuth.std_rad)
 
     def imu(self, client: TagClient, imu: Imu, t_ns: int) -> None:
         mag = None if imu.mag is None else self._mounted.to_body(imu.mag)
@@ -58,19 +74,24 @@ class OneTag:
 
     def __init__(self, client: TagClient, names: Mapping[str, str], mounted: Mounting, log: StatusLog) -> None:
         self._client = client
-        self._samples = Samples(names, mounted, log)
+        self._samples = Samples(names, mounted, log, Azimuth())
         self._log = log
         self._only: str | None = None
 
     def publish(self, report: Report, t_ns: int) -> None:
         for one in report.ranges:
             if self._is_ours(one.tag):
+                self._note_azimuth(one)
                 self._samples.range(self._client, one.anchor, one, t_ns)
         if report.imu is not None and self._is_ours(report.imu.tag):
             self._samples.imu(self._client, report.imu, t_ns)
 
     def flush(self) -> None:
         """Do nothing: the client itself sends in time."""
+
+    def _note_azimuth(self, one: Range) -> None:
+        if not math.isnan(one.azimuth_rad):
+            self._log.add("the module measures azimuths, which are of use where it is an anchor: --as-anchor NAME")
 
     def _is_ours(self, tag: str | None) -> bool:
         if self._only is None:
@@ -92,12 +113,13 @@ class ManyTags:
         names: Mapping[str, str],
         mounted: Mounting,
         log: StatusLog,
+        azimuth: Azimuth,
     ) -> None:
         """options: of the clients. as_anchor: the anchor that the module itself is; its ranges are then to tags."""
         self._prefix = prefix
         self._options = options
         self._as_anchor = as_anchor
-        self._samples = Samples(names, mounted, log)
+        self._samples = Samples(names, mounted, log, azimuth)
         self._log = log
         self._clients: dict[str, TagClient] = {}
 
@@ -106,6 +128,8 @@ class ManyTags:
             tag, anchor = self._tag_and_anchor(one)
             if (client := self._client(tag)) is not None:
                 self._samples.range(client, anchor, one, t_ns)
+                if self._as_anchor is not None:
+                    self._samples.azimuth(client, self._as_anchor, one, t_ns)
         if report.imu is not None and self._as_anchor is None and (client := self._client(report.imu.tag)) is not None:
             self._samples.imu(client, report.imu, t_ns)
 

@@ -42,12 +42,16 @@ class Dropped(Counter[Drop]):
 
 
 class Range(NamedTuple):
-    """A range as the module reports it, m. tag: the id of the tag, where the module names it. std_m: NaN if unknown."""
+    """A range as the module reports it, m. tag: the id of the tag, where the module names it. std_m: NaN if unknown.
+
+    azimuth_rad: of what is named, seen from the module: 0 straight ahead, positive to the left; NaN: not measured.
+    """
 
     anchor: int | str
     range_m: float
     tag: str | None = None
     std_m: float = math.nan
+    azimuth_rad: float = math.nan
 
 
 class Imu(NamedTuple):

@@ -1,5 +1,6 @@
 """Patterns: what they find in a line, what they say of a mistake, and that no line and no pattern makes them fail."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -193,6 +194,28 @@ LINES = st.one_of(
         "".join
     ),
 )
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "degrees"),
+    [
+        ("{anchor} {range:m} {azimuth:deg}", "A 3.0 30", 30.0),
+        ("{anchor} {range:m} {azimuth:-deg}", "A 3.0 30", -30.0),
+        ("{anchor} {range:m} {azimuth:rad}", "A 3.0 -0.5235987756", -30.0),
+        ("{anchor} {range:m} {azimuth:deg}", "A 3.0 350", -10.0),
+        ("{anchor} {range:m} {azimuth:deg}", "A 3.0 nan", None),
+        ("{anchor} {range:m} {right:cm} {ahead:cm}", "A 3.0 100 100", -45.0),
+        ("{anchor} {range:m} {right:cm} {ahead:cm}", "A 3.0 -100 0", 90.0),
+        ("{anchor} {range:m} {right:cm} {ahead:cm}", "A 3.0 0 0", None),
+        ("json: d -> range:m, a -> azimuth:deg, q -> merit:%", '{"d": 3, "a": 30, "q": 100}', 30.0),
+        ("json: d -> range:m, a -> azimuth:deg, q -> merit:%", '{"d": 3, "a": 30, "q": 0}', None),
+        ("json: d -> range:m, a -> azimuth:deg", '{"d": 3}', None),
+    ],
+)
+def test_an_azimuth_is_positive_to_the_left_and_may_be_a_place(text: str, line: str, degrees: float | None) -> None:
+    one, *_ = found(text, line) or [Range(0, math.nan)]
+    assert one.range_m == 3.0
+    assert math.degrees(one.azimuth_rad) == pytest.approx(math.nan if degrees is None else degrees, nan_ok=True)
 
 
 @settings(max_examples=400)

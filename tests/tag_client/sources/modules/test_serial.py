@@ -1,5 +1,6 @@
 """Modules at a real pseudo-terminal, at their baud rates: what they print is published, whatever happens."""
 
+import math
 import re
 import subprocess
 import time
@@ -84,6 +85,25 @@ def test_a_module_that_is_a_pattern_is_found_and_what_it_prints_is_published(
     ):
         wait_until(lambda: len(received.ranges()) >= 5)
         assert set(ranges(received)) == set(expected)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "degrees"),
+    [("pdoa", [], -45.0), ("pdoa", ["--mirrored"], 45.0), ("qm33-json", ["--azimuth-std", "5"], 0.1)],
+)
+def test_what_an_anchor_measures_of_the_direction_of_a_tag_is_its_bearing(
+    router_endpoint: str, tmp_path: Path, name: str, options: list[str], degrees: float
+) -> None:
+    with (
+        listening(router_endpoint) as received,
+        plugged_in(tmp_path / "port", PATTERN_EXAMPLES[name].answer(), MODULES[name].baud) as module,
+        serial(router_endpoint, module, "--module", name, "--tag-from-id", "--as-anchor", "7", *options),
+    ):
+        wait_until(lambda: len(received.ranges()) >= 5)
+        bearing = next(one for frame in received.frames for one in frame.bearings)
+    assert bearing.anchor == 7
+    assert math.degrees(bearing.bearing_rad) == pytest.approx(degrees, abs=1e-3)
+    assert math.degrees(bearing.std_rad) == pytest.approx(5.0 if "--azimuth-std" in options else 10.0, abs=1e-3)
 
 
 def test_a_dwm1001_that_reports_already_is_not_written_to(router_endpoint: str, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 _LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
+_ANGLES = {"deg": math.pi / 180, "rad": 1.0, "-deg": -math.pi / 180, "-rad": -1.0}
 _TIMES = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0}
 _ACC = {"m/s2": 1.0, "g": 9.80665, "mg": 9.80665e-3}
 _GYRO = {"rad/s": 1.0, "deg/s": math.pi / 180, "mdeg/s": math.pi / 180_000}
@@ -16,12 +17,20 @@ ANYTHING = "_"
 NUMBERS = {
     "range": _LENGTHS,
     "std": _LENGTHS,
+    "azimuth": _ANGLES,
+    "ahead": _LENGTHS,
+    "right": _LENGTHS,
+    "merit": {"%": 1.0},
     "t": _TIMES,
     **dict.fromkeys(ACC, _ACC),
     **dict.fromkeys(GYRO, _GYRO),
     **dict.fromkeys(MAG, _MAG),
 }
-"""The factor of each unit, to SI, µT and ns, by the field that may have it."""
+"""The factor of each unit, to SI, µT and ns, by the field that may have it.
+
+azimuth: positive to the left, with -deg to the right. ahead, right: where what is named lies, as the module sees it.
+merit: of the azimuth, which says nothing where this is 0.
+"""
 
 
 class PatternError(ValueError):

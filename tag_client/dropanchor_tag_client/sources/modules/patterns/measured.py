@@ -48,8 +48,25 @@ def _range(fields: Mapping[str, Field], found: Found, dropped: Dropped) -> Range
     std_m = _number(fields["std"], found.get("std")) if "std" in fields else None
     good_std = std_m is not None and math.isfinite(std_m) and std_m > 0.0
     text = None if tag is None else str(tag)
-    made = Range(anchor, range_m, text, std_m) if good_std and std_m else Range(anchor, range_m, text)
+    std = std_m if good_std and std_m else math.nan
+    made = Range(anchor, range_m, text, std, _azimuth(fields, found))
     return made if plausible(range_m, dropped) else None
+
+
+def _azimuth(fields: Mapping[str, Field], found: Found) -> float:
+    """Return the azimuth of a measurement, rad to the left of straight ahead; NaN without one."""
+
+    def told(name: str) -> float:
+        value = _number(fields[name], found.get(name)) if name in fields else None
+        return math.nan if value is None else value
+
+    if told("merit") == 0.0:
+        return math.nan
+    ahead, right, azimuth = told("ahead"), told("right"), told("azimuth")
+    if "azimuth" in fields:
+        return math.remainder(azimuth, math.tau) if math.isfinite(azimuth) else math.nan
+    is_place = math.isfinite(ahead + right) and (ahead, right) != (0.0, 0.0)
+    return math.atan2(-right, ahead) if is_place else math.nan
 
 
 def _imu(fields: Mapping[str, Field], found: Found, dropped: Dropped) -> Imu | None:
