@@ -17,7 +17,6 @@ import numpy as np
 from dropanchor_service.checkpoints.format import CheckpointError, Snapshot
 from dropanchor_service.checkpoints.layouts import VERSION, DTypes
 from dropanchor_service.estimation.columns import Array, default_settings
-from dropanchor_service.store.rows import COUNTS
 
 Fresh = Callable[[Array], Mapping[str, Array]]
 """Takes TAG_SETTINGS of all rows, and returns the arrays of the engine as they are before the first sample."""
@@ -29,26 +28,6 @@ SETTINGS = "engine.settings"
 def _names(found: Snapshot, array: str) -> tuple[str, ...]:
     """Return the columns of an array of a snapshot, none if it is not there."""
     return (found.arrays[array].dtype.names or ()) if array in found.arrays else ()
-
-
-def with_more_counters(found: Snapshot) -> Snapshot:
-    """Return a snapshot whose counters have room for the kinds of samples and the reasons that a layout appended.
-
-    In `screened` the messages stand behind the kinds.
-    """
-    if "rejected" not in _names(found, "counts"):
-        return found
-    before = found.arrays["counts"]
-    after = np.zeros(len(before), COUNTS)
-    for name in before.dtype.names or ():
-        if before[name].ndim == 1:
-            after[name] = before[name]
-            continue
-        known = before[name].shape[1] - (name == "screened")
-        after[name][:, :known] = before[name][:, :known]
-        if name == "screened":
-            after[name][:, -1] = before[name][:, -1]
-    return Snapshot({**found.arrays, "counts": after}, found.document)
 
 
 HEADING_MODELS = np.array([0, 0, 0, 0, 2, 3], np.uint8)  # by the number of before: those of a reading start anew
@@ -67,7 +46,7 @@ def with_two_heading_models(found: Snapshot) -> Snapshot:
     return Snapshot(arrays, found.document)
 
 
-STEPS: Steps = {6: with_more_counters, 7: with_two_heading_models}
+STEPS: Steps = {7: with_two_heading_models}
 
 
 def migrated(found: Snapshot, version: int, dtypes: DTypes, fresh: Fresh, steps: Steps = STEPS) -> Snapshot:

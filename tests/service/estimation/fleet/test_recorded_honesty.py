@@ -50,6 +50,14 @@ def test_a_walker_whose_steps_are_small_is_not_surely_in_the_wrong_place(walk: s
     assert score.coverage > 0.93
 
 
+@pytest.mark.parametrize("drone", ["cf_circle_xy", "cf_sine_xyz"])
+def test_a_drone_that_flies_sideways_is_hardly_ever_tracking(drone: str) -> None:
+    row = Row(drone, "recorded", "nothing", "known", (recording_or_skip(drone),))
+    score = run_row(row, [tag_run(row, one) for one in sources(row, [])]).score
+    assert score.tracking_share < 0.1  # measured: 0.04 and 0.07; 0.11 and 0.41 without the sums of sideways increments
+    assert score.coverage > 0.85
+
+
 def largest_rhythm(name: str) -> float:
     """Return the largest sum of steps in a row at similar intervals that a recording shows, m/s^2."""
     imu = read_recording(recording_or_skip(name)).imu

@@ -163,6 +163,10 @@ MOUNTING: Final = np.dtype(
         ("lateral_misfit", np.float64),  # mean square of the sideways innovation of a rigid mount, in its variance
         ("lateral_along", np.float64),  # the same of its derivative by the mounting angle, 1/rad^2
         ("lateral_cross", np.float64),  # mean product of the two, 1/rad
+        ("slid", np.float64),  # m/s, sum of these innovations over a second, see `sliding`
+        ("slid_std", np.float64),  # m/s, of what is the same in each of them
+        ("slid_var", np.float64),  # (m/s)^2, of the rest
+        ("sliding", np.float64),  # mean square of the sum, in its variance
     ]
 )
 

@@ -8,6 +8,7 @@ from dropanchor_service.estimation.fleet.belief.layout import Anchors, Belief, F
 from dropanchor_service.estimation.fleet.belief.observability import predict_information, sigma_obs
 from dropanchor_service.estimation.fleet.belief.parts import fill_parts
 from dropanchor_service.estimation.fleet.belief.rigidity import is_askew
+from dropanchor_service.estimation.fleet.belief.sliding import slides
 from dropanchor_service.estimation.fleet.belief.states import (
     AMBIGUOUS,
     COASTING,
@@ -58,7 +59,7 @@ def publish(
     belief.sigma_obs = sigma_obs(row.publication.information)
     widen_by_reference(row, scratch)
     _update_resolved(row, node, p_mode, relative, r, t)
-    undecided = row.walk.carried == 0 and (node.stepping == 1 or is_askew(row))
+    undecided = row.walk.carried == 0 and (node.stepping == 1 or is_askew(row) or slides(row, t))
     _set_state(row, _has_rivals(row, p_mode), undecided, relative, _sigma_pos(cov), r, work[head].nlos == 1)
     if row.publication.resolved == 0 or p_mode < DOMINANT or row.walk.carried == 1:
         spread_over_all(work, count, scratch)
@@ -143,7 +144,7 @@ def _set_state(row: Row, rivals: bool, undecided: bool, relative: float, sigma: 
     elif sigma > max(LARGE_M, LARGE_SHARE * r):
         # A mode that is small without the rotation about the anchor lacks only the heading.
         publication.state, publication.reason = AMBIGUOUS, HEADING_UNSURE if _is_small(relative, r) else UNCERTAIN
-    elif undecided:  # whether it is carried, or what its mounting angle is
+    elif undecided:  # whether it is carried, what its mounting angle is, or along which axis it moves
         publication.state, publication.reason = AMBIGUOUS, UNCERTAIN
     elif row.nlos.misfit > MISFIT_LIMIT or nlos:
         publication.state, publication.reason = DEGRADED, RANGES_REJECTED

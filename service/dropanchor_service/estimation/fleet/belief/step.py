@@ -50,6 +50,7 @@ from dropanchor_service.estimation.fleet.belief.pool import load, mirror, releas
 from dropanchor_service.estimation.fleet.belief.predict import fill_class_noise, fill_noise, is_empty, predict
 from dropanchor_service.estimation.fleet.belief.publish import publish
 from dropanchor_service.estimation.fleet.belief.rigidity import RIGID_SLIP, follow_mount, slip_std_of, weight_power
+from dropanchor_service.estimation.fleet.belief.sliding import follow_sliding
 from dropanchor_service.estimation.fleet.belief.start import is_in_site_frame, uses_heading
 from dropanchor_service.estimation.fleet.belief.states import FAULT
 from dropanchor_service.estimation.fleet.belief.tilt import bends_tilt
@@ -75,6 +76,7 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
     if is_empty(node):
         return
     decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
+    follow_sliding(work[best_of(work, count)], scratch, node, row)
     lateral, slip_std = follow_mount(work, count, row, node, t, scratch), slip_std_of(row)
     rigid = slip_std <= RIGID_SLIP
     power = weight_power(row, rigid, t)
