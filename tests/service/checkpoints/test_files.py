@@ -2,6 +2,7 @@
 
 import errno
 import os
+import threading
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
@@ -104,10 +105,11 @@ def test_the_previous_checkpoint_is_used_when_any_byte_of_the_newest_is_changed(
 
 
 class Disk:
-    """File operations that fail from the one with the number `fails_at` on."""
+    """File operations of this thread that fail from the one with the number `fails_at` on."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, error: int, fails_at: int) -> None:
         self.tried = 0
+        self._thread = threading.get_ident()
         self._error = error
         self._fails_at = fails_at
         for name in ("open", "write", "fsync", "replace"):
@@ -115,6 +117,8 @@ class Disk:
 
     def _failing(self, real: Callable[..., Any]) -> Callable[..., Any]:
         def operation(*arguments: Any) -> Any:
+            if threading.get_ident() != self._thread:
+                return real(*arguments)
             self.tried += 1
             if self.tried >= self._fails_at:
                 raise OSError(self._error, os.strerror(self._error))

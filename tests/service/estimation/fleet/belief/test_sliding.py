@@ -48,10 +48,11 @@ def test_a_tag_that_sways_slides() -> None:
     assert slides(row, TUNING)
 
 
-@pytest.mark.parametrize("how", [{}, {"turn": 0.8}, {"jolts": 0.01}, {"turn": 0.8, "jolts": 0.01}])
-def test_a_vehicle_that_winds_and_jolts_does_not(how: dict[str, float]) -> None:
+@pytest.mark.parametrize("turn", [0.0, 0.8])
+@pytest.mark.parametrize("jolts", [0.0, 0.01])
+def test_a_vehicle_that_winds_and_jolts_does_not(turn: float, jolts: float) -> None:
     row = row_of()
-    move(row, sway=0.0, **how)
+    move(row, sway=0.0, turn=turn, jolts=jolts)
     assert not slides(row, TUNING)
 
 
