@@ -53,6 +53,8 @@ NOT_RUN = {
     "keep-a-history.md: sudo -u postgres createuser --pwprompt dropanchor": "changes a database of the machine",
     "keep-a-history.md: dropanchor history move --from /var/lib/dropanchor/history.sqlite "
     "--password-file /etc/dropanchor/database-password \\": "needs a database: tests/service/history",
+    "measure-azimuth.md: dropanchor-tag serial /dev/ttyUSB0 --module pdoa --tag-from-id --as-anchor yard "
+    "--azimuth-std 10 --connect tcp/127.0.0.1:7447": "needs a module: tests/e2e/test_measured_azimuth.py",
     "measure-accuracy.md: pip install 'dropanchor-service[evaluation]'": _PIP,
     "measure-accuracy.md: dropanchor evaluate product --quick": "takes hours: tests/evaluation",
     "measure-accuracy.md: dropanchor evaluate bounds --rows 'S5/*' --seeds 5000-5019": "takes hours",

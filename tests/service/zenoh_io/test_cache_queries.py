@@ -51,6 +51,9 @@ def test_a_cache_is_asked_for_what_its_tag_has_sent_since_it_was_heard(router_en
     with connected_session(router_endpoint) as session, connected_session(router_endpoint) as of_tags:
         known, new = Limits(of_tags, "a"), Limits(of_tags, "b")
         caches = ZenohCaches(session, sites, Metrics(), clock)
+        for tag in ("a", "b"):  # the start asks once only
+            with session.declare_querier(f"{key_of(tag)}/@adv/**") as querier:
+                wait_until(lambda querier=querier: querier.matching_status.matching)  # type: ignore[misc]
         caches.start(CatchUp(MessageBuffer(1000), [], lambda _: {}, caches.ask, 10))
         try:
             wait_until(lambda: known.asked and new.asked)

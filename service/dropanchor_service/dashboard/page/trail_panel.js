@@ -120,7 +120,7 @@ function sourceOf({ source, file, at }, path) {
 }
 
 /** @param {object} value */
-const partsOf = (value) => Object.entries(value).filter(([key]) => key !== "id").map(([key, part]) => `${key} ${JSON.stringify(part)}`).join(", ");
+const partsOf = (value) => Object.entries(value).filter(([key, part]) => key !== "id" && part !== null).map(([key, part]) => `${key} ${JSON.stringify(part)}`).join(", ");
 
 /** @param {any} value */
 function written(value) {
