@@ -20,7 +20,7 @@ def test_a_service_starts_with_a_damaged_cache(tmp_path: Path, monkeypatch: pyte
     cache = tmp_path / "cache"
     shutil.copytree(os.environ[VARIABLE], cache)
     monkeypatch.setenv(VARIABLE, str(cache))
-    index, code = next(cache.glob("*/ageing.*.nbi")), next(cache.glob("*/heights.*.nbc"))
+    index, code = next(cache.glob("*/ageing.*.nbi")), next(cache.glob("*/heights.*.1.nbc"))
     index.write_bytes(b"")
     whole = bytearray(code.read_bytes())
     whole[len(whole) // 2] ^= 0x80

@@ -140,4 +140,4 @@ class Queue:
     def _back_off(self, first_s: float, failures: int) -> float:
         """Return the time to the next attempt, s. It doubles, and varies so that receivers are not hit in step."""
         wait_s = min(first_s * 2.0 ** min(failures, 20), self.patience.retry_s)
-        return wait_s * random.uniform(0.75, 1.0)
+        return wait_s * random.SystemRandom().uniform(0.75, 1.0)  # has no state that other threads share
