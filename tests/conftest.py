@@ -4,7 +4,7 @@ import gc
 import os
 import signal
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -27,7 +27,6 @@ settings.load_profile("dropanchor")
 
 # One worker runs these tests, which need no kernels, while another one fills the kernel cache.
 FIRST = ("benchmarks", "schemas", "tag_client")
-WAITING = ("deploy", "e2e", "faults")
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
@@ -41,8 +40,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.outside)
         if is_long(item):
             item.add_marker(pytest.mark.long)
-    ranks = _ranks(dict.fromkeys(item.path for item in items))
-    items.sort(key=lambda item: ranks[item.path])
+    items.sort(key=_rank)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -62,19 +60,9 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(50_000, 20, 20)
 
 
-def _ranks(files: Iterable[Path]) -> dict[Path, tuple[int, float]]:
-    """Return what to sort the files of tests by.
-
-    Those that wait for other programs come among those that compute, so that no processor is idle; and none of them is
-    among the last, for which one worker would keep the others waiting.
-    """
-    kinds: tuple[list[Path], list[Path], list[Path]] = ([], [], [])
-    for path in files:
-        folder = path.relative_to(Path(__file__).parent).parts[0]
-        kinds[0 if folder in FIRST else 1 if folder in WAITING else 2].append(path)
-    first, waiting, computing = kinds
-    parts = ((first, 0, 1.0), (waiting, 1, 0.9), (computing, 1, 1.0))
-    return {path: (turn, share * n / len(part)) for part, turn, share in parts for n, path in enumerate(part)}
+def _rank(item: pytest.Item) -> int:
+    folder = item.path.relative_to(item.config.rootpath / "tests").parts[0]
+    return FIRST.index(folder) if folder in FIRST else len(FIRST)
 
 
 @pytest.fixture
