@@ -66,7 +66,7 @@ class SensorCheck:
     def unjudged(self, row: int) -> list[Finding]:
         """Return why the sensors of this row, of which nothing wrong is known, are not judged now."""
         check = self._checks[row]
-        is_vigorous = check["imu_verdict"] == ImuVerdict.GOOD and check["right_s"] < 0.0
+        is_vigorous = check["imu_verdict"] == ImuVerdict.GOOD and check["vigorous_s"] > 0.0
         return [VIGOROUS] if is_vigorous else []
 
     def note_absurd(self, imu_rows: Array, imu_sizes: Array, range_rows: Array) -> None:

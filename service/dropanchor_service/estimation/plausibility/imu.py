@@ -148,9 +148,10 @@ def _judge(c: Check, acc: Vector, gyro: Vector, mag: Vector, has_mag: bool, seco
         _settle(c, _judge_gyro_alive(c, acc))
         if _is_vigorous(c, acc):
             _suspend(c)
-    if c.right_s < 0.0:
-        c.right_s = min(0.0, c.right_s + seconds)
+    if c.vigorous_s > 0.0:
+        c.vigorous_s = max(0.0, c.vigorous_s - seconds)
         return
+    c.held_s += seconds
     _settle(c, judge_gravity(c, acc, seconds, repeated_s(c, c.acc_ns), repeated_s(c, c.gyro_ns)))
     if c.imu_verdict == RAW_COUNTS:
         _settle(c, GOOD)
@@ -174,14 +175,13 @@ def _is_vigorous(c: Check, acc: Vector) -> bool:
 @njit(nogil=True)
 def _suspend(c: Check) -> None:
     """Judge no more until the motion is moderate. What its first half second has shown, counts no more either."""
-    fresh = 0.0 <= c.right_s < MODERATE_S
-    if c.right_s >= 0.0:
+    if c.vigorous_s == 0.0:
         _forget(c)
-    if c.imu_verdict == ACC_SCALE or (fresh and c.imu_verdict in (AXES_DIFFER, GYRO_IN_DEG)):
+    is_fresh = c.held_s < MODERATE_S and c.imu_verdict in (AXES_DIFFER, GYRO_IN_DEG)
+    if is_fresh or c.imu_verdict == ACC_SCALE:
         _settle(c, GOOD)
         c.known_s = 0.0
-    c.right_s = -MODERATE_S
-    c.calm_ns = 0
+    c.vigorous_s, c.right_s, c.calm_ns = MODERATE_S, 0.0, 0
 
 
 @njit(nogil=True)
@@ -207,9 +207,7 @@ def _settle(c: Check, verdict: int) -> None:
         c.dip_s = 0.0
         c.moved = 0
         _forget(c)
-    if verdict in (AXES_DIFFER, GYRO_IN_DEG):
-        c.right_s = 0.0  # since when it holds
-    c.imu_verdict = verdict
+    c.imu_verdict, c.held_s = verdict, 0.0
 
 
 @njit(nogil=True)

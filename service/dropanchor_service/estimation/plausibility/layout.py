@@ -40,10 +40,12 @@ CHECK = np.dtype(
         ("acc_ns", "i8"),  # when the acceleration was last another value, to the last bit
         ("gyro_ns", "i8"),
         ("before", BLOCK),
+        ("vigorous_s", "f4"),  # until it is judged again after vigorous motion; 0: it is judged
+        ("held_s", "f4"),  # for which the verdict has held, while it was judged
         # gravity
         ("known_s", "f4"),  # of blocks so far
         ("wrong_s", "f4"),  # of the last blocks without gravity
-        ("right_s", "f4"),  # of the last blocks with gravity; negative: until an IMU is judged after vigorous motion
+        ("right_s", "f4"),  # of the last blocks with gravity
         ("norm", "f4"),  # m/s², slow mean of |mean acceleration|
         ("level", "f4", 3),  # m/s², slow mean of the acceleration
         ("moved", "i4"),  # blocks with motion since the gyroscope changed
