@@ -16,7 +16,7 @@ LEAST = 5  # azimuths, and ranges
 LEAST_NS, LONGEST_NS = 500_000_000, 1_500_000_000  # from the first to the last of them
 UNKNOWN_STD = math.radians(10.0)
 LEAST_STD_M = 0.3
-LASTING = 17.0  # root of 10 Hz · 30 s
+LASTING = 17.0  # root of 10 Hz · 30 s, in which the mean of azimuths is to be as unsure as one
 AGREE = 3.0  # standard deviations: azimuths that differ by more are reflections, or from both sides of the antennas
 
 
@@ -79,7 +79,8 @@ def with_lasting_errors(samples: SampleBatch, anchors: AnchorTable) -> SampleBat
     if not are_azimuths.any():
         return samples
     bearings = samples.bearings.copy()
-    bearings["std"][are_azimuths] *= LASTING
+    told = bearings["std"][are_azimuths]
+    bearings["std"][are_azimuths] = LASTING * np.where(told > 0.0, told, UNKNOWN_STD)
     return replace(samples, bearings=bearings)
 
 

@@ -91,12 +91,12 @@ def test_errors_that_last_do_not_average_out(scenario: str, lasting: float) -> N
     assert run.beyond(5.0) == 0
 
 
-def message(begin: int, azimuths: list[float]) -> Frame:
+def message(begin: int, azimuths: list[float], std_rad: float = FIVE) -> Frame:
     """Return ranges of 10 m and these azimuths, every 0.1 s. begin: number of the first one."""
     times = [T0_NS + (begin + i) * 100_000_000 for i in range(len(azimuths))]
     return Frame(
         ranges=[RangeSample(t_ns, 1, 10.0) for t_ns in times],
-        bearings=[BearingSample(t_ns, 1, one, FIVE) for t_ns, one in zip(times, azimuths, strict=True)],
+        bearings=[BearingSample(t_ns, 1, one, std_rad) for t_ns, one in zip(times, azimuths, strict=True)],
     )
 
 
@@ -120,6 +120,12 @@ def test_the_start_is_where_the_anchor_faces_and_is_as_unsure_as_one_azimuth() -
     fused = bench.engine.batches[-1].bearings
     assert fused["bearing"] == pytest.approx(math.pi / 2)
     assert (fused["std"] > 10.0 * FIVE).all()
+
+
+def test_azimuths_that_do_not_say_how_sure_they_are_last_too() -> None:
+    bench = bench_of(0.0)
+    starts_of(bench, message(0, AHEAD, math.nan))
+    assert (bench.engine.batches[-1].bearings["std"] > 10.0 * FIVE).all()
 
 
 @pytest.mark.parametrize(
