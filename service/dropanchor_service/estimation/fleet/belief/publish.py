@@ -59,7 +59,7 @@ def publish(
     belief.sigma_obs = sigma_obs(row.publication.information)
     widen_by_reference(row, scratch)
     _update_resolved(row, node, p_mode, relative, r, t)
-    undecided = row.walk.carried == 0 and (node.stepping == 1 or is_askew(row) or slides(row, t))
+    undecided = row.walk.carried == 0 and (node.stepping == 1 or is_askew(row) or slides(row))
     _set_state(row, _has_rivals(row, p_mode), undecided, relative, _sigma_pos(cov), r, work[head].nlos == 1)
     if row.publication.resolved == 0 or p_mode < DOMINANT or row.walk.carried == 1:
         spread_over_all(work, count, scratch)

@@ -76,7 +76,7 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
     if is_empty(node):
         return
     decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
-    follow_sliding(work[best_of(work, count)], scratch, node, row)
+    follow_sliding(work[best_of(work, count)], scratch, node, row, t)
     lateral, slip_std = follow_mount(work, count, row, node, t, scratch), slip_std_of(row)
     rigid = slip_std <= RIGID_SLIP
     power = weight_power(row, rigid, t)

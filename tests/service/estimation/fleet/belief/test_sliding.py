@@ -39,13 +39,13 @@ def move(row: Any, sway: float, turn: float = 0.0, jolts: float = 0.0, speed: fl
         node = node_of(dt=DT, dyaw=dyaw, forward=0.0, left=left)
         node["rest"] = RESTING if rest else MOVING
         one, scratch = hypothesis_of(state, np.diag(np.full(N, 1e-4)))
-        follow_sliding(one, scratch, node, row)
+        follow_sliding(one, scratch, node, row, TUNING)
 
 
 def test_a_tag_that_sways_slides() -> None:
     row = row_of()
     move(row, sway=1.0)
-    assert slides(row, TUNING)
+    assert slides(row)
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.8])
@@ -53,13 +53,13 @@ def test_a_tag_that_sways_slides() -> None:
 def test_a_vehicle_that_winds_and_jolts_does_not(turn: float, jolts: float) -> None:
     row = row_of()
     move(row, sway=0.0, turn=turn, jolts=jolts)
-    assert not slides(row, TUNING)
+    assert not slides(row)
 
 
 def test_a_told_mount_says_that_the_tag_moves_along_its_axis() -> None:
     row = row_of(mount_angle=0.0)
     move(row, sway=1.0)
-    assert not slides(row, TUNING)
+    assert not slides(row)
 
 
 def test_what_moves_at_rest_tells_nothing() -> None:
