@@ -14,6 +14,7 @@ from packaging.utils import canonicalize_name
 from release.staging import FOLDERS
 from release.version import ROOT
 
+_MIT = "Permission is hereby granted, free of charge, to any person obtaining a copy of this software"
 _LONGEST_LICENCE = 60  # in "License"; some packages put the whole text there
 
 
@@ -106,9 +107,16 @@ def _package(name: str, needs: set[str], extras: list[str]) -> Package:
 
 
 def _licence(found: Distribution) -> str:
-    """Return what a package declares: as SPDX wherever it does, else in the words of its classifiers, or its own."""
+    """Return what a package declares: as SPDX where it does, else in the words of its classifiers or of a file."""
     fields = {name: found.metadata.get_all(name) or [] for name in ("License-Expression", "License", "Classifier")}
     texts = [*fields["License-Expression"], *(text for text in fields["License"] if len(text) <= _LONGEST_LICENCE)]
     as_spdx = [text for text in texts if is_supported_id(text) or is_expression(text)]
     classifiers = [line.rpartition(" :: ")[2] for line in fields["Classifier"] if line.startswith("License ::")]
-    return next(iter(as_spdx), "") or ", ".join(classifiers) or next(iter(texts), "see the package")
+    declared = next(iter(as_spdx), "") or ", ".join(classifiers) or next(iter(texts), "")
+    return declared or ("MIT" if _MIT in _text_of(found) else "see the package")
+
+
+def _text_of(found: Distribution) -> str:
+    """Return the licence that a package brings as a file, on one line."""
+    files = (found.read_text(f"licenses/{name}") for name in found.metadata.get_all("License-File") or [])
+    return " ".join(" ".join(text.split()) for text in files if text)

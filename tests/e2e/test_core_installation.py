@@ -22,7 +22,18 @@ def only_in_extras() -> list[str]:
 
 def test_the_service_runs_without_any_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     absent = only_in_extras()
-    assert {"pmtiles", "pypdfium2", "pyproj", "paho", "psycopg", "pyarrow", "ray", "rosbags", "s3fs"} <= set(absent)
+    assert {
+        "pmtiles",
+        "pypdfium2",
+        "pyproj",
+        "paho",
+        "psycopg",
+        "pyarrow",
+        "ray",
+        "rosbags",
+        "resvg_py",
+        "s3fs",
+    } <= set(absent)
     program = [sys.executable, "-c", without(*absent) + COMMAND]
     monkeypatch.setattr("support.service.command", lambda *arguments: [*program, *arguments])
     with running_service() as service:

@@ -9,7 +9,7 @@ from support.recordings import write_square
 
 COMPILING_S = 600.0  # at most, where no kernel is in the cache
 EXTRA = ("matplotlib", "scipy", "sympy")
-MAPS = ("pmtiles", "pypdfium2", "pyproj")
+MAPS = ("pmtiles", "pypdfium2", "pyproj", "resvg_py")
 SERVICE_AND_ENGINE = """
 import dropanchor_service.service
 from dropanchor_service.engines.choose import create_engine
@@ -160,17 +160,18 @@ for crs in ("", "site", "EPSG:25833"):
     request = Request(media_type="image/png", world=world if crs else None, crs=crs, georeference=origin)
     found = read_plan(file.getvalue(), request).description
     print(found.width_px, found.note)
-try:
-    read_plan(b"%PDF-1.7", Request(media_type="application/pdf"))
-except RefusedError as error:
-    print(error)
+for media_type in ("application/pdf", "image/svg+xml"):
+    try:
+        read_plan(b"", Request(media_type=media_type))
+    except RefusedError as error:
+        print(error)
 """
     ended = python("-c", without(*MAPS) + check)
     assert ended.stdout.splitlines() == [
         "40 ",
         "40 The image does not lie within 100 km of the site's origin. Is its coordinate system right?",
         "40 EPSG:25833 needs the extra `maps`: pip install 'dropanchor-service[maps]'",
-        "A PDF needs the extra `maps`: pip install 'dropanchor-service[maps]'.",
+        *2 * ("PDF and SVG need the extra `maps`: pip install 'dropanchor-service[maps]'.",),
     ], ended.stderr
 
 

@@ -3,7 +3,6 @@ import { test } from "node:test";
 
 import { floorsOf, isElsewhere } from "../../../service/dropanchor_service/dashboard/plan/floors.js";
 import { latLonIn } from "../../../service/dropanchor_service/dashboard/plan/geodesy.js";
-import { PATIENCE_MS, TooSlowError, drawnInTime, inTime } from "../../../service/dropanchor_service/dashboard/plan/patience.js";
 import { aligned, cornersOf, isInside, pixelOf, residuals, siteOf } from "../../../service/dropanchor_service/dashboard/plan/transform.js";
 import { isWorldFile, worldOf } from "../../../service/dropanchor_service/dashboard/plan/world_file.js";
 
@@ -85,41 +84,4 @@ test("a world file is known by its name and must hold six numbers", async () => 
   assert.ok(isWorldFile("hall.PGW") && isWorldFile("hall.tfw") && !isWorldFile("hall.png"));
   assert.equal(await worldOf(new File(["0.1\r\n0\n0\n-0.1\n5\n8e2\n"], "a.pgw")), "0.1,0,0,-0.1,5,800");
   await assert.rejects(worldOf(new File(["0.1 0 0"], "a.pgw")), /six numbers/);
-});
-
-/** Draw with a clock by which a drawing of this side takes so long. @param {(side: number, attempt: number) => number} cost_ms */
-async function drawnBy(cost_ms) {
-  let clock_ms = 0;
-  /** @type {number[]} */
-  const sides = [];
-  const found = await drawnInTime(4096, (side) => { clock_ms += cost_ms(side, sides.push(side)); return side; }, () => clock_ms);
-  return { found, sides, clock_ms };
-}
-
-test("a drawing is shown at its full size when that is fast enough, however many shapes it has", async () => {
-  for (const fixed of [0, 5, 300]) {
-    const { found, sides } = await drawnBy((side) => fixed + side * side * 5e-5);
-    assert.deepEqual(found, { drawing: 4096, isWhole: true });
-    assert.deepEqual(sides, [16, 64, 256, 1024, 4096]);
-  }
-});
-
-test("a drawing whose pixels take too long is shown coarsely, and no attempt takes long", async () => {
-  const { found, clock_ms } = await drawnBy((side) => 1 + side * side * 1e-3);
-  assert.deepEqual(found, { drawing: 1024, isWhole: false });
-  assert.ok(clock_ms < 2 * PATIENCE_MS);
-});
-
-test("a moment in which the machine was busy does not make a plan coarse", async () => {
-  const { found } = await drawnBy((side, attempt) => (attempt === 2 ? 500 : 1));
-  assert.deepEqual(found, { drawing: 4096, isWhole: true });
-});
-
-test("a drawing that is too slow at its smallest size is not shown", async () => {
-  assert.equal((await drawnBy(() => PATIENCE_MS + 1)).found, null);
-});
-
-test("an image that does not load in time is given up", { timeout: 10_000 }, async () => {
-  assert.equal(await inTime(Promise.resolve(7)), 7);
-  await assert.rejects(inTime(new Promise(() => undefined)), TooSlowError);
 });

@@ -33,9 +33,9 @@ _HEADERS = {
 }
 _DESCRIPTION = f"""\
 The body is the file: PNG, JPEG, SVG, a PDF of which one page is drawn, or TIFF. It has at most \
-{MAX_UPLOAD_BYTES >> 20} MiB and 40 megapixels. The type of its content counts: another `Content-Type` is refused. An \
-SVG must only draw: scripts, `foreignObject` and references to other files are refused. The answer holds a `placement` \
-if the site has a georeference and the file is a GeoTIFF or comes with a world file.
+{MAX_UPLOAD_BYTES >> 20} MiB and 40 megapixels. The type of its content counts: another `Content-Type` is refused, and \
+so is an SVG that refers to other files. The answer holds a `placement` if the site has a georeference and the file is \
+a GeoTIFF or comes with a world file.
 
 Put the `image` of the answer into a plan. The service keeps the last images that no plan uses."""
 

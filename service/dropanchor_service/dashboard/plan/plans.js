@@ -28,7 +28,6 @@ export class Plans {
     map.isElsewhere = (row) => isElsewhere(this.floors.chosen, value.floor[row], number.floor_probability[row]);
     giveTo(map, [this.editor]);
     for (const source of [this.images, this.floors]) source.addEventListener("change", () => map.redraw());
-    this.images.addEventListener("change", () => this.#sayFaults());
     this.store.addEventListener("change", () => this.#takePlans());
     connection.addEventListener("site", (event) => (this.editor.georeference = /** @type {CustomEvent} */ (event).detail.georeference));
     connection.addEventListener("settings", () => this.store.refresh());
@@ -56,17 +55,5 @@ export class Plans {
     this.images.keep(this.store.plans.map(({ image }) => image));
     this.floors.setPlans(this.store.plans);
     this.map.redraw();
-    this.#sayFaults();
-  }
-
-  /** Say which plans are not shown, or not in full, because a browser takes too long for them. */
-  #sayFaults() {
-    const lines = /** @type {const} */ ([["slow", "plans.slow"], ["coarse", "plans.coarse"]]).map(([fault, message]) => {
-      const plans = this.store.plans.filter(({ image }) => this.images.faultOf(image) === fault);
-      return plans.length === 0 ? "" : t(message, { plans: plans.map(({ id, name }) => name || id).join(", ") });
-    });
-    const notice = byId("plan-faults");
-    notice.textContent = lines.filter(Boolean).join(" ");
-    notice.hidden = notice.textContent === "";
   }
 }

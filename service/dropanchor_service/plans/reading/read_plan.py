@@ -10,28 +10,31 @@ from dropanchor_service.plans.reading.ground import UnplacedError, affine_of_tif
 from dropanchor_service.plans.reading.messages import Description, ReadPlan, Request
 from dropanchor_service.plans.reading.raster import encoded, open_image, pixels_of
 from dropanchor_service.plans.reading.refused import RefusedError
-from dropanchor_service.plans.reading.svg import sanitised
 
 
 def read_plan(content: bytes, request: Request) -> ReadPlan:
     """Return the image in a file. Raises RefusedError."""
-    if request.media_type == PDF:
-        return _read_pdf(content, request)
-    return _read_svg(content) if request.media_type == SVG else _read_raster(content, request)
+    try:
+        if request.media_type == PDF:
+            return _read_pdf(content, request)
+        return _read_svg(content) if request.media_type == SVG else _read_raster(content, request)
+    except ModuleNotFoundError as error:
+        raise RefusedError(
+            say("no_drawing", "PDF and SVG need the extra `maps`: pip install 'dropanchor-service[maps]'")
+        ) from error
 
 
 def _read_svg(content: bytes) -> ReadPlan:
-    drawing, width, height = sanitised(content)
-    return ReadPlan(Description(media_type="image/svg+xml", width_px=width, height_px=height), drawing)
+    from dropanchor_service.plans.reading.svg import drawn_svg
+
+    png, (width, height), lack = drawn_svg(content)
+    note, phrase = (lack, Phrase.of(lack)) if lack else ("", None)
+    return ReadPlan(Description(width_px=width, height_px=height, note=note, note_phrase=phrase), png)
 
 
 def _read_pdf(content: bytes, request: Request) -> ReadPlan:
-    try:
-        from dropanchor_service.plans.reading.pdf import drawn_page
-    except ModuleNotFoundError as error:
-        raise RefusedError(
-            say("no_pdf", "a PDF needs the extra `maps`: pip install 'dropanchor-service[maps]'")
-        ) from error
+    from dropanchor_service.plans.reading.pdf import drawn_page
+
     image, pages = drawn_page(content, request.page)
     return ReadPlan(
         Description(media_type="image/png", width_px=image.width, height_px=image.height, pages=pages),

@@ -1,115 +1,72 @@
-"""Let an SVG through if it only draws: no script, no other file, nothing outside the SVG namespace."""
+"""Draw an SVG. One that needs another file is refused: the drawing would lack it."""
 
 import re
 from collections.abc import Iterator
+from io import BytesIO
 from xml.etree import ElementTree
 
-from defusedxml.common import DefusedXmlException
-from defusedxml.ElementTree import fromstring
+from PIL import Image
+from resvg_py import svg_to_bytes
 
-from dropanchor_schemas.sentences import said_by, say
+from dropanchor_schemas.sentences import Sentence, said_by, say
 from dropanchor_service.plans.reading.refused import RefusedError
-from dropanchor_service.plans.reading.svg_size import size_of
-from dropanchor_service.plans.reading.svg_styles import at_rest
-from dropanchor_service.plans.reading.svg_weight import Scales
 
-MAX_ELEMENTS = 200_000
-NAMESPACE = "http://www.w3.org/2000/svg"
-_SVG = f"{{{NAMESPACE}}}"
+LONGER_SIDE_PX = 4096  # the page shows no more
+
+_SVG = "{http://www.w3.org/2000/svg}"
 _HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
-
-_DRAWING = re.compile(
-    "svg|g|defs|symbol|use|switch|title|desc|style|path|rect|circle|ellipse|line|polyline|polygon|text|tspan|textPath|"
-    "image|linearGradient|radialGradient|stop|pattern|clipPath|mask|marker|filter|fe[A-Za-z]+"
+_WITHIN = re.compile(r"#|data:image/(?:png|jpeg);base64,")  # images within images could refer to files again
+_REFERENCE = re.compile(r"(?:url\s*\(|@import)\s*(.{0,40})", re.IGNORECASE | re.DOTALL)
+_DOTS_PER_INCH = 96.0  # of CSS
+_LETTER = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><text y="9">m</text></svg>'
+_NO_FONT = say(
+    "svg_no_font",
+    "no font is installed where the service runs, so the plan lacks its texts: install one, such as Debian's "
+    "package fonts-dejavu-core, and upload the plan again",
 )
-_WITHOUT_EFFECT = re.compile("metadata|view|cursor|animate|animateMotion|animateTransform|set|mpath|discard")
-_EMBEDDED = re.compile(r"data:image/(?:png|jpeg);base64,[A-Za-z0-9+/=\s]*")
-_REFERENCE = re.compile(r"(?:url|src|image|image-set)\s*\(\s*(.{0,40})", re.IGNORECASE | re.DOTALL)
 
 
-def sanitised(content: bytes) -> tuple[bytes, int, int]:
-    """Return an SVG that only draws, its width and its height in pixels. Raises RefusedError."""
+def drawn_svg(content: bytes) -> tuple[bytes, tuple[int, int], Sentence | None]:
+    """Return a drawing as PNG, its width and height in pixels, and what it lacks. Raises RefusedError."""
+    root = _read(content)
+    for file in _references(root):
+        raise RefusedError(
+            say(
+                "svg_file",
+                "the SVG refers to another file: {file}. Embed what it needs when you save it, "
+                "or save it as PNG or PDF",
+                file=repr(file[:80]),
+            )
+        )
     try:
-        root = fromstring(content, forbid_entities=True, forbid_external=True)
-    except DefusedXmlException as error:
-        raise RefusedError(say("svg_entities", "the SVG declares entities. Save it as plain SVG")) from error
+        png = _png(ElementTree.tostring(root, encoding="unicode"), LONGER_SIDE_PX)
+    except ValueError as error:
+        raise RefusedError(
+            say("svg_undrawn", "the SVG cannot be drawn: {why}. Save it as PNG or PDF", why=said_by(error).rstrip("."))
+        ) from error
+    lacks_texts = root.find(f".//{_SVG}text") is not None and not Image.open(BytesIO(_png(_LETTER, 9))).getbbox()
+    return png, Image.open(BytesIO(png)).size, _NO_FONT if lacks_texts else None
+
+
+def _read(content: bytes) -> ElementTree.Element:
+    try:
+        root = ElementTree.fromstring(content)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise RefusedError(say("svg_damaged", "the SVG is damaged: {why}", why=said_by(error))) from error
     if root.tag != f"{_SVG}svg":
         raise RefusedError(say("svg_other", "the file is XML, but no SVG"))
-    if sum(1 for _ in root.iter()) > MAX_ELEMENTS:
-        raise RefusedError(
-            say("svg_large", "the SVG has more than {n} elements. Save it as PNG or PDF", n=MAX_ELEMENTS)
-        )
-    _clean(root)
-    Scales(root, {element: _name(element) for element in root.iter()}).require_bearable()
-    width, height = size_of(root)
-    ElementTree.register_namespace("", NAMESPACE)
-    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True), width, height
+    return root
 
 
-def _clean(element: ElementTree.Element) -> None:
-    """Remove what has no effect on the drawing, from the element and from all in it. Raises RefusedError."""
-    for found in list(element.iter()):
-        for child in list(found):
-            if not child.tag.startswith(_SVG) or _WITHOUT_EFFECT.fullmatch(_name(child)):
-                found.remove(child)
-    for found in element.iter():
-        name = _name(found)
-        if not _DRAWING.fullmatch(name):
-            raise RefusedError(
-                say(
-                    "svg_element",
-                    "the SVG contains <{name}>, which is not allowed. Save it as plain SVG, PNG or PDF",
-                    name=name[:40],
-                )
-            )
-        found.attrib = dict(_kept_attributes(found))
-        if name == "style":
-            text = "".join(found.itertext())
-            _require_local(text)
-            found[:], found.text = [], at_rest(text)
+def _references(root: ElementTree.Element) -> Iterator[str]:
+    """Yield the other files that elements, attributes and styles name."""
+    for element in root.iter():
+        hrefs = [element.get(name, "#").strip() for name in _HREFS] if element.tag != f"{_SVG}a" else []
+        yield from (href for href in hrefs if not _WITHIN.match(href))
+        for text in (*element.attrib.values(), element.text or ""):
+            yield from (found for found in _REFERENCE.findall(text) if not found.lstrip("'\"").startswith("#"))
 
 
-def _kept_attributes(element: ElementTree.Element) -> Iterator[tuple[str, str]]:
-    for name, value in element.attrib.items():
-        if name in _HREFS:
-            yield "href", _local_href(_name(element), value)
-        elif name.lower().startswith("on"):
-            raise RefusedError(
-                say(
-                    "svg_script",
-                    "the SVG contains a script: the attribute {name}. Save it as plain SVG",
-                    name=name[:40],
-                )
-            )
-        elif not name.startswith("{"):
-            _require_local(value)
-            yield name, at_rest(value) if name == "style" else value
-
-
-def _local_href(element: str, value: str) -> str:
-    if value.strip().startswith("#") or (element == "image" and _EMBEDDED.fullmatch(value.strip())):
-        return value.strip()
-    raise RefusedError(
-        say(
-            "svg_image",
-            "the SVG refers to another file: {file}. Embed its images when you save it",
-            file=repr(value[:80]),
-        )
-    )
-
-
-def _require_local(text: str) -> None:
-    """Raise RefusedError for a style or an attribute that could load something."""
-    if "\\" in text or "@import" in text.lower():
-        raise RefusedError(say("svg_style", "the SVG has a style that may load another file. Save it as plain SVG"))
-    for reference in _REFERENCE.findall(text):
-        if not reference.lstrip("'\"").startswith("#"):
-            raise RefusedError(
-                say("svg_file", "the SVG refers to another file: {file}. Save it as plain SVG", file=repr(reference))
-            )
-
-
-def _name(element: ElementTree.Element) -> str:
-    return str(element.tag).removeprefix(_SVG)
+def _png(drawing: str, longer_side_px: int) -> bytes:
+    """Return a drawing as PNG. Raises ValueError."""
+    return svg_to_bytes(svg_string=drawing, width=longer_side_px, height=longer_side_px, dpi=_DOTS_PER_INCH)

@@ -34,8 +34,6 @@ export default {
   "plans.reversed": "Das obere Ende muss über dem unteren liegen.",
   "plans.no_image": "Wählen Sie auch das Bild des Plans.",
   "plans.reading": "{file} wird gelesen …",
-  "plans.slow": "Nicht gezeigt, weil das Zeichnen zu lange dauert: {plans}. Speichern Sie den Plan als PNG oder PDF, und laden Sie das hoch.",
-  "plans.coarse": "Nur grob gezeigt, weil das Zeichnen zu lange dauert: {plans}. Speichern Sie den Plan als PNG oder PDF, und laden Sie das hoch.",
   "plans.question": "Den Plan {plan} löschen?",
   "plans.added": "Plan {plan} hinzugefügt.",
   "plans.changed": "Plan {plan} geändert.",

@@ -34,8 +34,6 @@ export default {
   "plans.reversed": "The upper end must be above the lower end.",
   "plans.no_image": "Choose the image of the plan, too.",
   "plans.reading": "Reading {file} …",
-  "plans.slow": "Not shown, because drawing takes too long: {plans}. Save the plan as PNG or PDF, and upload that.",
-  "plans.coarse": "Shown coarsely, because drawing takes too long: {plans}. Save the plan as PNG or PDF, and upload that.",
   "plans.question": "Delete the plan {plan}?",
   "plans.added": "Plan {plan} added.",
   "plans.changed": "Plan {plan} changed.",
