@@ -9,10 +9,11 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import RedirectResponse, Response
 from starlette.routing import BaseRoute, Match, Mount, Route
 from starlette.staticfiles import NotModifiedResponse, PathLike, StaticFiles
-from starlette.types import Scope
+from starlette.types import ASGIApp, Scope
 
 from dropanchor_service.api.help.routes import help_routes
 from dropanchor_service.api.http.site_in_path import is_omlox
@@ -54,6 +55,11 @@ class _Files(StaticFiles):
         return NotModifiedResponse(response.headers) if is_known else response
 
 
+def _compressed(files: ASGIApp) -> ASGIApp:
+    """Return files in a third of the bytes. They hold no secret that their size could tell, as answers of REST may."""
+    return GZipMiddleware(files, compresslevel=6)
+
+
 def _to_folder(response: RedirectResponse) -> Response:
     """Lead to the same folder as the redirect, from where the client sees it: a proxy may have it below a path."""
     to = urlsplit(response.headers["location"])
@@ -83,7 +89,7 @@ def page_mounts(dashboard: Path) -> list[BaseRoute]:
     """Return the routes of the pages: the documentation, that of REST with its program, and last the dashboard."""
     swagger_ui = _Files(Path(str(files("fastapi_swagger.resources"))))
     leading = [_leading(path, to) for path, to in ELSEWHERE.items()]
-    of_rest = Mount("/docs/swagger-ui", app=swagger_ui, name="swagger-ui")
+    of_rest = Mount("/docs/swagger-ui", app=_compressed(swagger_ui), name="swagger-ui")
     return [*leading, *help_routes(), of_rest, DashboardMount(dashboard)]
 
 
@@ -96,7 +102,7 @@ class DashboardMount(Mount):
 
     def __init__(self, folder: Path) -> None:
         """Serve the files in `folder`. Raises RuntimeError when it does not exist."""
-        super().__init__("/", app=_Files(folder, html=True), name="dashboard")
+        super().__init__("/", app=_compressed(_Files(folder, html=True)), name="dashboard")
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
         path = scope["path"]

@@ -68,6 +68,15 @@ def test_every_program_comes_without_imports_and_its_modules_can_still_be_fetche
     assert "\nexport class Fleet" in ask(app, "GET", "/data/fleet.js").text
 
 
+def test_the_page_comes_in_a_third_of_its_bytes() -> None:
+    app = make_api_bench().app(DASHBOARD)
+    for path in ("/page/main.js", "/docs/swagger-ui/swagger-ui-bundle.js"):
+        response = ask(app, "GET", path, headers={"accept-encoding": "gzip"})
+        assert response.headers["content-encoding"] == "gzip"
+        assert 3 * int(response.headers["content-length"]) < len(response.content), path
+        assert "content-encoding" not in ask(app, "GET", path, headers={"accept-encoding": "identity"}).headers
+
+
 def test_every_program_that_a_page_or_a_worker_names_is_bundled() -> None:
     scripts = {
         f"{page.parent.relative_to(DASHBOARD)}/{name}".removeprefix("./")
