@@ -47,7 +47,9 @@ BU03 = "distance: 1.234000"
 
 PATTERN_EXAMPLES = {
     "dw1000": PatternExample([(DW1000, [("1786", 3.21)])], lambda: talkative(DW1000)),
-    "linorobot": PatternExample([("$1782,3.21", [("1782", 3.21)])], lambda: talkative("$1782,3.21")),
+    "linorobot": PatternExample(
+        [("$1782,3.21", [("1782", 3.21)])], lambda: talkative("$1782,3.21"), ("--module", "linorobot")
+    ),
     "bu01": PatternExample(
         [("an0:0.55m", [("0", 0.55)]), ("an1:12.40m", [("1", 12.40)])], lambda: talkative("an0:0.55m")
     ),

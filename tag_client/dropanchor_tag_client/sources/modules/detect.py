@@ -1,45 +1,57 @@
-"""Find out which module is on a port. Write to the port only if nothing arrives."""
+"""Find out which module is on a port. Write to the port only if nothing arrives for a while."""
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 
 import serial
 
 from dropanchor_tag_client.sources.modules.catalogue import MODULES
 from dropanchor_tag_client.sources.modules.heard import Heard
 from dropanchor_tag_client.sources.modules.module import Module
+from dropanchor_tag_client.sources.modules.recognise import unasked, understands
 from dropanchor_tag_client.sources.modules.report import Report
 
 Arrived = tuple[int, list[Report]]
 _LISTEN_S = 1.5
+_QUIET_S = 4.0  # a board that prints a line every few seconds is not written to
 _BETWEEN_WRITES_S = 1.0
 _CHUNK = 4096
 
 
 def detect(port: serial.Serial, baud: int | None, log: Callable[[str], None]) -> Generator[Arrived, None, Module]:
-    """Return the module whose report is understood first. Tries the usual baud rates in turn, for ever.
+    """Return the module whose measurement is understood first. Tries the usual baud rates in turn, for ever.
 
     log: takes a message for the user.
     """
     rates = [baud] if baud else sorted({module.baud for module in MODULES.values()})
+    last_s = time.monotonic()
     while True:
         heard = {rate: Heard() for rate in rates}
         for rate in rates:
             port.baudrate = rate
-            found = yield from _listen(port, heard[rate])
-            silent = () if heard[rate].count else (module for module in MODULES.values() if module.baud == rate)
-            for candidate in silent:  # a module that sends something else is left alone
-                if found is None and candidate.start_commands:
-                    yield from write(port, candidate.start_commands)
-                    found = yield from _listen(port, heard[rate])
+            found = yield from _listen(port, heard[rate], unasked())
+            if heard[rate].count:  # another device may talk here: it is left alone
+                last_s = time.monotonic()
+            elif time.monotonic() - last_s > _QUIET_S:
+                found = yield from _ask(port, rate, heard[rate])
             if found is not None:
                 return found
         log(f"{port.port}: no module recognised yet {_what_arrived(heard)}")
+        rates.reverse()  # or a line every few seconds may come at the wrong one for ever
 
 
-def recognised(data: bytes) -> Module | None:
-    """Return the module that understands some of what arrived, if there is one."""
-    return next((module for module in MODULES.values() if module.parser().feed(data)), None)
+def _ask(port: serial.Serial, rate: int, heard: Heard) -> Generator[Arrived, None, Module | None]:
+    """Return the module that reports after its start commands. One that measures only when asked is asked twice."""
+    for candidate in MODULES.values():
+        if candidate.baud == rate and candidate.start_commands:
+            yield from write(port, candidate.start_commands)
+            found = yield from _listen(port, heard, MODULES.values())
+            if found is not None and found.poll:
+                yield from write(port, found.start_commands)
+                found = yield from _listen(port, heard, [found])
+            if found is not None:
+                return found
+    return None
 
 
 def read(port: serial.Serial) -> bytes:
@@ -57,15 +69,15 @@ def write(port: serial.Serial, commands: tuple[bytes, ...]) -> Generator[Arrived
         port.write(command)
 
 
-def _listen(port: serial.Serial, heard: Heard) -> Generator[Arrived, None, Module | None]:
-    """Return the module whose report is understood within a while."""
-    parsers = [(module, module.parser()) for module in MODULES.values()]
+def _listen(port: serial.Serial, heard: Heard, candidates: Iterable[Module]) -> Generator[Arrived, None, Module | None]:
+    """Return the module whose measurement is understood within a while."""
+    parsers = [(module, module.parser()) for module in candidates]
     end_s = time.monotonic() + _LISTEN_S
     while time.monotonic() < end_s:
         data = read(port)
         heard.add(data)
         for module, parser in parsers:
-            if parser.feed(data):
+            if understands(parser, data):
                 return module
         yield time.time_ns(), []
     return None
@@ -73,7 +85,7 @@ def _listen(port: serial.Serial, heard: Heard) -> Generator[Arrived, None, Modul
 
 def _what_arrived(heard: dict[int, Heard]) -> str:
     counts = ", ".join(f"{one.count} bytes at {rate} baud" for rate, one in heard.items())
-    rate, most = max(heard.items(), key=lambda item: (item[1].is_text, item[1].count))
+    rate, most = max(heard.items(), key=lambda item: item[1].clarity)
     if not most.count:
         return f"({counts}). Is it on? --module says which it is."
     return f"({counts}). The last that arrived: {most.sentence(rate)}"

@@ -3,10 +3,16 @@
 import re
 import shlex
 
+from dropanchor_tag_client.sources.modules.foreign import foreign_to_uwb
+
 _KEPT_BYTES = 4096
 _SHOWN = 120
 _LINE_END = re.compile(rb"[\r\n]+")
 _NOT_TEXT = re.compile(rb"[^\t\r\n\x1b -~]")
+_NOTHING = (
+    "--pattern describes a line that holds a range or the axes of an IMU; any script can read the port and pipe into "
+    "`publish`."
+)
 _MAX_NOT_TEXT = 0.2  # of the bytes of lines that a few damaged characters leave readable
 
 
@@ -28,33 +34,42 @@ class Heard:
     def is_text(self) -> bool:
         return len(_NOT_TEXT.findall(self.last)) <= _MAX_NOT_TEXT * len(self.last)
 
+    @property
+    def clarity(self) -> tuple[bool, bool, int]:
+        """The greater, the more likely is the baud rate the right one."""
+        return self.foreign is not None, self.is_text and self.count > 0, self.count
+
+    @property
+    def foreign(self) -> str | None:
+        """What prints this, if it is known and no UWB module."""
+        return foreign_to_uwb(self.last)
+
     def sentence(self, baud: int) -> str:
         """Return what arrived at this baud rate, and what to do about it."""
+        if self.foreign is not None:
+            return f"it looks like {self.foreign}."
         if not self.is_text:
             shown = visible(self.last[:_SHOWN].decode("latin-1"))
             return (
                 f'no text: "{shown}". Another --baud than {baud} may be right, or the module speaks a binary protocol.'
             )
-        *lines, rest = _LINE_END.split(self.last)
-        line = next((one for one in reversed(lines) if one.strip()), b"").decode("latin-1").strip()
-        if not line:
+        *ended, rest = _LINE_END.split(self.last)
+        lines = [text for one in ended if (text := one.decode("latin-1").strip())]
+        if not lines:
             return f'no end of a line: "{visible(rest.decode("latin-1"))}". A measurement has to be a line of its own.'
-        return f'"{visible(line)}". {way_out(line)}'
+        # 1 MB, which a module that is understood does not need
+        from dropanchor_tag_client.sources.modules.patterns.suggest import suggestion
+        from dropanchor_tag_client.sources.modules.recognise import likeness
+
+        if (known := likeness(self.last)) is not None:
+            return f'"{visible(lines[-1])}". {known}'
+        if (found := suggestion(lines)) is not None:
+            words = f"--pattern {shlex.quote(found.pattern)}{found.warning}"
+            return f'"{visible(found.line)}". If it holds {found.holds}, try: {words}'
+        return f'"{visible(lines[-1])}". {_NOTHING}'
 
 
 def visible(text: str) -> str:
     """Return a text that a terminal can show, cut at a length."""
     shown = text.encode("unicode_escape").decode()
     return shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}…"
-
-
-def way_out(line: str) -> str:
-    """Return how a line that no module prints can be read: by a pattern that fits it, if one suggests itself."""
-    # 1 MB, which a module that is understood does not need
-    from dropanchor_tag_client.sources.modules.patterns.parser import pattern
-    from dropanchor_tag_client.sources.modules.patterns.suggest import suggestion
-
-    suggested = suggestion(line)
-    if suggested is not None and pattern(suggested).found(line):
-        return f"If it holds a range, try: --pattern {shlex.quote(suggested)}"
-    return "--pattern describes a line that holds a range; any script can read the port and pipe into `publish`."

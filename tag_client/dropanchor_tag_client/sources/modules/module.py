@@ -10,7 +10,8 @@ class Module(NamedTuple):
     """A supported module.
 
     baud: as delivered. start_commands: written to a silent module, one per second. hint: what its owner can do if it
-    stays silent. poll: commands that are written in turn, all the time, to a module that measures only when asked.
+    stays silent. poll: commands that are written in turn, all the time, to a module that measures only when asked; only
+    its answers tell that it is there. only_named: other boards print such lines, too, so that they tell nothing.
     """
 
     name: str
@@ -19,6 +20,7 @@ class Module(NamedTuple):
     start_commands: tuple[bytes, ...]
     hint: str
     poll: tuple[bytes, ...] = ()
+    only_named: bool = False
 
 
 def commands(texts: list[str]) -> tuple[bytes, ...]:

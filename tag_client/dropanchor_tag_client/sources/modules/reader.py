@@ -6,10 +6,11 @@ from collections.abc import Callable, Generator, Iterator
 
 import serial
 
-from dropanchor_tag_client.sources.modules.detect import Arrived, detect, read, recognised, write
+from dropanchor_tag_client.sources.modules.detect import Arrived, detect, read, write
 from dropanchor_tag_client.sources.modules.heard import Heard
 from dropanchor_tag_client.sources.modules.module import Module
 from dropanchor_tag_client.sources.modules.port import PortError, open_port
+from dropanchor_tag_client.sources.modules.recognise import recognised
 from dropanchor_tag_client.sources.modules.report import Dropped, Parser, Report
 
 # A DWM1001 at rest may report only every 10 s, and a second `lec` would stop it: wait longer before the second attempt.
@@ -36,6 +37,7 @@ class Reader:
         self.raw_bytes = 0
         self._heard = Heard()
         self._reported = False
+        self._may_write = module is not None or start is not None
         self._name, self._module, self._baud, self._start, self._poll, self._log = port, module, baud, start, poll, log
 
     @property
@@ -94,7 +96,8 @@ class Reader:
                     parser, poll = other.parser(), _Poll(self._poll or other.poll)
                     continue
                 self._log(f"{self._name}: {self._silence(self._module, port.baudrate)}")
-                yield from write(port, self._start_commands(self._module))
+                if self._may_write or not self._heard.count:  # a module that nobody named may be another one by now
+                    yield from write(port, self._start_commands(self._module))
 
     def _other_module(self) -> Module | None:
         """Return the module that understands what arrived, where the one that was named never did."""

@@ -16,6 +16,13 @@ from support.pattern_strings import DW1000, QM33
 from support.serial_module import Answer, plugged_in, talkative
 from support.zenoh_router import wait_until
 
+
+def witmotion() -> bytes:
+    """Return a frame with accelerations and one with turn rates."""
+    frames = (bytes([0x55, kind, *range(8)]) for kind in (0x51, 0x52))
+    return b"".join(frame + bytes([sum(frame) & 0xFF]) for frame in frames)
+
+
 UNKNOWN = "RNG peer 0x12 dist 1234 mm q=9"
 
 
@@ -51,7 +58,7 @@ def test_all_anchors_of_a_line_are_named(router_endpoint: str, tmp_path: Path) -
 
 
 def test_a_module_that_reports_no_anchor_is_said_to_hear_none(router_endpoint: str, tmp_path: Path) -> None:
-    text = heard(router_endpoint, tmp_path, talkative("DIST,0"), "hears no anchor")
+    text = heard(router_endpoint, tmp_path, talkative("DIST,0"), "hears no anchor", "--module", "dwm1001")
     assert "left out" not in text
 
 
@@ -66,6 +73,51 @@ def test_a_line_that_nobody_knows_is_shown_with_the_pattern_to_try(router_endpoi
     text = heard(router_endpoint, tmp_path, talkative(f"\x07{UNKNOWN}"), "try: --pattern")
     assert f'"\\x07{UNKNOWN}"' in text
     assert "--pattern 'peer {anchor} dist {range:mm} mm'" in text
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        (said.LEP, "A dwm1001 prints positions so (lep). Ranges are needed: type `lec`, or --module dwm1001."),
+        ("DIST,0", "dwm1001 prints such lines; these hold no distance. Is it set up as a tag, and is an anchor on?"),
+        ("$1782,3.21", "linorobot prints such lines, and other boards do, too: --module linorobot if it is one."),
+        (witmotion(), "it looks like a WitMotion sensor in its binary protocol: an IMU"),
+        ("$GPGGA,,,,,,0,,,,,,,,*66", "it looks like a GNSS receiver (NMEA)"),
+    ],
+)
+def test_what_is_not_enough_to_be_a_module_is_called_by_its_name(
+    router_endpoint: str, tmp_path: Path, line: str | bytes, sentence: str
+) -> None:
+    assert sentence in heard(router_endpoint, tmp_path, talkative(line), "no module recognised yet")
+
+
+@pytest.mark.parametrize("period_s", [0.05, 3.0])
+def test_a_board_that_talks_is_not_taken_for_a_module_nor_written_to(
+    router_endpoint: str, tmp_path: Path, period_s: float
+) -> None:
+    with (
+        listening(router_endpoint) as received,
+        plugged_in(tmp_path / "port", talkative("Distance: 312"), period_s=period_s) as module,
+    ):
+        command = (
+            "-m",
+            "dropanchor_tag_client",
+            "serial",
+            str(module.path),
+            "--tag",
+            "a",
+            "--connect",
+            router_endpoint,
+        )
+        process = start_python(*command)
+        try:
+            for _ in range(2):
+                read_until(process, "try: --pattern 'Distance: {range:cm}' (the line does not say its unit", 30.0)
+        finally:
+            process.terminate()
+            process.communicate(timeout=PATIENCE_S)
+    assert not received.frames
+    assert module.written == b""
 
 
 def test_a_line_without_a_range_is_shown_with_both_ways_out(router_endpoint: str, tmp_path: Path) -> None:

@@ -12,7 +12,8 @@ from dropanchor_tag_client.sources.modules.patterns.parser import Pattern, Patte
 _BAUD = 115_200
 _HINT = "Is an anchor on, and is --baud right?"
 _TEXTS = ("patterns", "ignore", "start", "poll")
-_KEYS = (*_TEXTS, "repeats", "baud", "hint")
+_SWITCHES = ("repeats", "only_named")
+_KEYS = (*_TEXTS, *_SWITCHES, "baud", "hint")
 
 
 def module_of_file(path: Path) -> Module:
@@ -46,10 +47,12 @@ def _module(path: Path, given: dict[str, Any]) -> Module:
         raise ValueError(f"{path}: baud is {baud!r}, a whole number such as 115200 was expected")
     if not isinstance(hint, str):
         raise ValueError(f"{path}: hint is {hint!r}, a text was expected")
-    if not isinstance(repeats := given.get("repeats", False), bool):
-        raise ValueError(f"{path}: repeats is {repeats!r}, true or false was expected")
+    repeats, only_named = (given.get(key, False) for key in _SWITCHES)
+    for key, value in zip(_SWITCHES, (repeats, only_named), strict=True):
+        if not isinstance(value, bool):
+            raise ValueError(f"{path}: {key} is {value!r}, true or false was expected")
     parser = _parser(_checked(given["patterns"], str(path)), tuple(ignore), repeats)
-    return Module(path.stem, baud, parser, commands(start), hint, commands(poll))
+    return Module(path.stem, baud, parser, commands(start), hint, commands(poll), only_named)
 
 
 def _parser(

@@ -148,7 +148,17 @@ def _piece(part: _Part, after: _Part | None, *, capture: bool) -> str:
         return "^" if part.word == _LINE_BEGINS else "$"
     is_number = _is_number(part)
     group = _NUMBER if is_number else _name_expression(after)
-    return f"{' ?' if is_number else ''}({'' if capture else '?:'}{group})"
+    unit = "" if after is not None and after.text else _no_other_unit(part)
+    return f"{' ?' if is_number else ''}({'' if capture else '?:'}{group}){unit}"
+
+
+def _no_other_unit(part: _Part) -> str:
+    """Return the expression that no length of another unit stands here: a pattern in m is not for `12 cm`."""
+    units = NUMBERS.get(part.field.name, {}) if part.field is not None else {}
+    others = [
+        unit for unit, scale in units.items() if part.field is not None and scale != part.field.scale and unit != "in"
+    ]
+    return rf"(?! ?(?:{'|'.join(others)})(?![A-Za-z]))" if part.field and part.field.name in ("range", "std") else ""
 
 
 def _name_expression(after: _Part | None) -> str:
