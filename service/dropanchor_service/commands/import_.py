@@ -28,7 +28,7 @@ A SOURCE is one of
                            with --map
   an MCAP file             with messages in JSON, or a recording of this service
   an export of a phone     Sensor Logger or phyphox: the folder, or the zip
-  tables                   CSV, TSV, JSON or JSON Lines: a file, a folder or a zip
+  tables                   CSV, TSV, JSON, JSON Lines or Parquet: a file, a folder or a zip
 Give several if the IMU and the ranges are in several.
 """
 EPILOG = """\
@@ -44,6 +44,7 @@ command prints the mapping that it guessed, to paste and correct.
   heading, heading_std     rad deg deg_compass         counter-clockwise from east; deg_compass: clockwise from north
   pressure                 Pa hPa kPa                  of the air, from a barometer
   t_nsec                                               nanoseconds to add to t
+What --map does not name is guessed all the same; FIELD= leaves it out.
 A unit may have a number: ax=raw_x:g/16384. SOURCE/FIELD=… is for one table or topic: uwb.csv/t=time:ms.
 
 examples:
@@ -63,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("sources", type=Path, nargs="+", metavar="SOURCE", help="file or folder to import; may be repeated")
     add("--out", type=Path, required=True, metavar="FOLDER", help="folder of the recording")
     add("--force", action="store_true", help="replace the recording in FOLDER")
+    add("--without-imu", action="store_true", help="write a recording without IMU samples, too")
     add(
         "--anchor",
         type=_anchor,
@@ -134,6 +136,11 @@ def _import(arguments: argparse.Namespace) -> None:
     _say([*readings.notes, *_guessed(founds)])
     if not len(samples.imu) and not len(samples.ranges) and not len(samples.headings):
         raise ImportingError("there is no reading left to write")
+    if not len(samples.imu) and not len(samples.headings) and not arguments.without_imu:
+        raise ImportingError(
+            "there are no IMU samples, without which a replay finds no place. What is not used, and why, stands above; "
+            "--map names columns. --without-imu writes the recording all the same"
+        )
     anchors = _anchors(samples, dict(arguments.anchor))
     write_recording(arguments.out, samples, anchors)
     _save_map(arguments.save_map, founds)
@@ -169,7 +176,7 @@ def _clashes(name: str, tables: dict[str, Fields]) -> bool:
 
 def _save_map(path: Path | None, founds: Sequence[Found]) -> None:
     if path is not None:
-        tables = {name: fields for found in founds for name, fields in (found.guessed | found.fields).items()}
+        tables = {name: fields for found in founds for name, fields in found.fields.items()}
         path.write_text(saved(tables))
         print(f"{path}: the mapping of {', '.join(tables)}; --map-file {shlex.quote(str(path))} uses it again")
 

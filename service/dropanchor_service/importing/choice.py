@@ -22,9 +22,10 @@ class Choice:
 
 @dataclass
 class Found:
-    """What a source holds. fields: the columns that were used of its tables; guessed: those of tables without a
-    mapping."""
+    """What a source holds. fields: the columns that were used of its tables; guessed: those of tables of which a part
+    was guessed. told: the fields of the mapping that it has."""
 
     readings: Readings
     fields: dict[str, Fields] = field(default_factory=dict)
     guessed: dict[str, Fields] = field(default_factory=dict)
+    told: set[str] = field(default_factory=set)

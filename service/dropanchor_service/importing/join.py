@@ -131,7 +131,7 @@ def _say_what_lacks(readings: Readings) -> None:
         ("accelerometer", readings.gyro, readings.acc),
     ):
         if len(has) and not len(lacks):
-            readings.notes.append(f"there is no {name}: without it the IMU is of no use, and is left out")
+            readings.notes.append(f"no column is known as that of a {name}: without it the IMU is left out")
 
 
 def _field(mag: Stream, t_ns: Array) -> Array:

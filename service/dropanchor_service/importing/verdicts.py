@@ -11,6 +11,7 @@ from dropanchor_service.importing.join import Imu
 from dropanchor_service.importing.readings import ACC, GYRO, Ranges, Unit
 from dropanchor_service.importing.readings import RANGE as OF_RANGE
 
+_MOST_RADPS = 36.0  # the usual range ends at 2000 deg/s
 _QUANTITY = {"acc_unit": ACC, "gyro_unit": GYRO, "range_unit": OF_RANGE}
 
 
@@ -19,7 +20,19 @@ def verdicts(imu: Imu, ranges: Ranges, units: Mapping[str, Unit]) -> list[str]:
     found: dict[str, Finding] = {}
     for anchor in sorted(set(ranges.anchors)) or [""]:
         found |= {finding.name: finding for finding in findings_of(_samples(imu, ranges, anchor))}
-    return [finding.sentence + _advice(finding, units) for finding in found.values()]
+    return [finding.sentence + _advice(finding, units) for finding in found.values()] + _of_turns(imu, units, found)
+
+
+def _of_turns(imu: Imu, units: Mapping[str, Unit], found: Mapping[str, Finding]) -> list[str]:
+    """Return that turn rates whose unit nobody told are degrees, where no such sensor measures so many radians."""
+    unit = units.get(GYRO, Unit(None))
+    largest = float(np.abs(imu.gyro).max()) if len(imu) else 0.0
+    if unit.name is not None or largest <= _MOST_RADPS or any(_QUANTITY.get(name) == GYRO for name in found):
+        return []
+    words = " ".join(f"{word}:deg/s" for word in unit.given)
+    return [
+        f"Turn rates of {largest:.3g} rad/s are more than such a sensor measures: are they deg/s? Here: --map {words}"
+    ]
 
 
 def _samples(imu: Imu, ranges: Ranges, anchor: str) -> SampleBatch:

@@ -31,10 +31,11 @@ class Import:
     def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         self.folder, self._capsys = folder, capsys
 
-    def __call__(self, *arguments: str | Path, out: str = "out") -> Ended:
+    def __call__(self, *arguments: str | Path, out: str = "out", imu: bool = False) -> Ended:
+        """imu: whether it is needed."""
         self._capsys.readouterr()
         folder = self.folder / out
-        status = main(["import", *map(str, arguments), "--out", str(folder)])
+        status = main(["import", *map(str, arguments), "--out", str(folder), *([] if imu else ["--without-imu"])])
         printed, error = self._capsys.readouterr()
         return Ended(status, printed, error, folder)
 

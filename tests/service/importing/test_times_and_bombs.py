@@ -126,7 +126,8 @@ each_reader = pytest.mark.parametrize("reader", READERS)
 
 
 def call(command: str, source: Path, folder: Path) -> int:
-    return main([command, str(source), *(["--out", str(folder / "out")] if command == "import" else [])])
+    options = ["--out", str(folder / "out"), "--without-imu"] if command == "import" else []
+    return main([command, str(source), *options])
 
 
 @each_reader
@@ -296,6 +297,7 @@ BOMBS: dict[str, tuple[str, Callable[[Path], Path]]] = {
     "zip": ("import", zipped),
     "folder, gz": ("replay", packed_folder),
     "folder, parquet": ("replay", parquet),
+    "parquet": ("import", lambda folder: parquet(folder) / "range.parquet"),
 }
 
 

@@ -12,7 +12,7 @@ from dropanchor_service.importing.files import first_bytes
 from dropanchor_service.importing.join import merged
 from dropanchor_service.importing.readings import ImportingError, Readings
 from dropanchor_service.importing.tables.mapping import ANCHOR, T_NSEC, VECTORS, WIDE, Column, T
-from dropanchor_service.importing.tables.reading import fields_of, is_useful, readings_of
+from dropanchor_service.importing.tables.reading import fields_of, is_useful, readings_of, told_of
 from dropanchor_service.recording.mcap_file import PROFILE
 
 _IMU_FIELDS = {T, T_NSEC, *VECTORS["acc"], *VECTORS["gyro"]}
@@ -39,6 +39,7 @@ def read_bag(path: Path, choice: Choice) -> Found:
             )
         parts.append((name, readings_of(table, fields)))
         found.fields[name] = fields
+        found.told |= set(told_of(table, choice.columns.texts_for(name)))
     found.readings = merged(parts, of_one_bag=True)
     found.readings.notes = [f"{path.name}: {_summary(chosen)}", *chosen.notes, *found.readings.notes, *bag.notes]
     return found
@@ -62,8 +63,8 @@ def _fields(table: TopicTable, choice: Choice, chosen: Chosen) -> dict[str, Colu
     """Return the columns of a topic: those told for it, or of all told ones those of its role, or else guessed."""
     own = choice.columns.of_source.get(table.name, {})
     told = {name: text for name, text in choice.columns.general.items() if name in _wanted(table.name, chosen)} | own
-    fields = fields_of(table, told) or fields_of(table, {})
-    fields = {name: column for name, column in fields.items() if own or name in _wanted(table.name, chosen)}
+    fields = fields_of(table, told)
+    fields = {name: column for name, column in fields.items() if name in own or name in _wanted(table.name, chosen)}
     if T not in told:
         fields.pop(T_NSEC, None)
         fields = {T: Column(STAMP, "ns")} | {name: column for name, column in fields.items() if name != T}

@@ -1,11 +1,13 @@
-"""Exports of the app Sensor Logger: a folder or zip with one CSV for each sensor.
+"""Exports of the app Sensor Logger: a folder or zip with one CSV for each sensor, or one JSON with all of them.
 
-Each has the columns time (UTC in ns), seconds_elapsed, z, y, x. Metadata.csv tells the platform, and whether
+Each CSV has the columns time (UTC in ns), seconds_elapsed, z, y, x. Metadata.csv tells the platform, and whether
 "Standardise Units & Frames" was on. https://github.com/tszheichoi/awesome-sensor-logger
 """
 
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,8 +15,9 @@ from dropanchor_service.importing.files import File
 from dropanchor_service.importing.phones.phone import imu_readings
 from dropanchor_service.importing.readings import ImportingError, LeftOut, Readings, stream_of
 from dropanchor_service.importing.streams import Stream
-from dropanchor_service.importing.tables.table import exact_number, number
-from dropanchor_service.importing.tables.text_table import TextTable, read_table
+from dropanchor_service.importing.tables.json_table import JsonTable, read_json
+from dropanchor_service.importing.tables.table import Row, Table, exact_number, number
+from dropanchor_service.importing.tables.text_table import read_table
 from dropanchor_service.importing.tables.times import bounded
 from dropanchor_tag_client.recording.recording import Rows
 from dropanchor_tag_client.sources.phones.pairing import Signs
@@ -25,6 +28,8 @@ _TIME, _VECTOR = "time", ("x", "y", "z")
 _BAROMETER = "barometer"
 _MARK = "seconds_elapsed"
 _METADATA = "metadata"
+_USED = (*SENSORS, _METADATA, _BAROMETER)
+_SENSOR, _JSON = "sensor", ".json"  # of an export with all sensors in one file
 
 
 def is_export(columns: Sequence[str]) -> bool:
@@ -35,14 +40,14 @@ def is_export(columns: Sequence[str]) -> bool:
 def read_export(files: Sequence[File], source: str, signs: Signs) -> Readings:
     """Return the IMU and the barometer of an export. Raises ImportingError."""
     left_out = LeftOut()
-    streams = {file.stem: _stream(read_table(file), _VECTOR, left_out) for file in files if file.stem in SENSORS}
-    metadata = next((_metadata(file) for file in files if file.stem == _METADATA), {})
+    tables, unused = _tables(files)
+    streams = {name: _stream(table, _VECTOR, left_out) for name, table in tables.items() if name in SENSORS}
+    metadata = _metadata(tables[_METADATA]) if _METADATA in tables else {}
     told = signs if signs is not Signs.AUTO else _signs(metadata)
     readings = imu_readings({name: stream for name, stream in streams.items() if len(stream)}, told, source)
-    for file in files:
-        if file.stem == _BAROMETER:
-            mbar = _stream(read_table(file), ("pressure",), left_out)
-            readings.pressure = Stream(mbar.t_ns, PA_PER_MBAR * mbar.values)
+    if _BAROMETER in tables:
+        mbar = _stream(tables[_BAROMETER], ("pressure",), left_out)
+        readings.pressure = Stream(mbar.t_ns, PA_PER_MBAR * mbar.values)
     readings.left_out.add_all(left_out)
     readings.notes.insert(0, f"{source}: an export of Sensor Logger{_platform(metadata)}")
     if told is Signs.AUTO:
@@ -52,13 +57,49 @@ def read_export(files: Sequence[File], source: str, signs: Signs) -> Readings:
         )
     elif told is Signs.IOS:
         readings.notes.append(f"{source}: accelerations of an iPhone: their sign is turned round")
-    unused = sorted(file.name for file in files if file.stem not in (*SENSORS, _METADATA, _BAROMETER))
     if unused:
         readings.notes.append(f"{source}: not used: {', '.join(unused[:8])}{', …' if len(unused) > 8 else ''}")
     return readings
 
 
-def _stream(table: TextTable, columns: Sequence[str], left_out: LeftOut) -> Stream:
+@dataclass(frozen=True)
+class _OfSensor:
+    """The rows of one sensor in a table of all of them."""
+
+    unit: ClassVar[str] = "line"
+    name: str
+    sensor: str
+    table: JsonTable
+    notes: tuple[str, ...] = ()
+    anchor_advice: str = ""
+
+    @property
+    def columns(self) -> Sequence[str]:
+        return self.table.columns
+
+    def rows(self, left_out: LeftOut) -> Iterator[Row]:
+        place = self.columns.index(_SENSOR)
+        return (row for row in self.table.rows(left_out) if row[1][place] == self.sensor)
+
+
+def _tables(files: Sequence[File]) -> tuple[dict[str, Table], list[str]]:
+    """Return the table of each sensor that is known, by its name in lower case, and what the others are called."""
+    tables: dict[str, Table] = {}
+    others: list[str] = []
+    for file in files:
+        if file.stem in _USED:
+            tables[file.stem] = read_table(file)
+        elif file.name.lower().endswith(_JSON) and _SENSOR in (whole := read_json(file)).columns:
+            names = dict.fromkeys(str(cells[whole.columns.index(_SENSOR)]) for _, cells in whole.rows(LeftOut()))
+            found = {name.lower(): _OfSensor(f"{file.name}: {name}", name, whole) for name in names}
+            tables |= {name: table for name, table in found.items() if name in _USED}
+            others += [table.name for name, table in found.items() if name not in _USED]
+        else:
+            others.append(file.name)
+    return tables, sorted(others)
+
+
+def _stream(table: Table, columns: Sequence[str], left_out: LeftOut) -> Stream:
     if missing := {_TIME, *columns} - set(table.columns):
         raise ImportingError(f"{table.name} lacks the columns {', '.join(sorted(missing))} of Sensor Logger")
     places = [table.columns.index(name) for name in (_TIME, *columns)]
@@ -79,9 +120,8 @@ def _stream(table: TextTable, columns: Sequence[str], left_out: LeftOut) -> Stre
     return stream_of(np.asarray(t_ns, np.int64), vectors, rows, "readings", left_out)
 
 
-def _metadata(file: File) -> Mapping[str, str]:
+def _metadata(table: Table) -> Mapping[str, str]:
     """Return the only row of the metadata, by column."""
-    table = read_table(file)
     row = next((cells for _, cells in table.rows(LeftOut())), ())
     return dict(zip(table.columns, map(str, row), strict=False))
 

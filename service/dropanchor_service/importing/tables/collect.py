@@ -108,7 +108,9 @@ class _Collector:
             if value is None:
                 continue
             anchor = name.removeprefix(WIDE) if name != RANGE else self._anchor(cells)
-            if not anchor:
+            if value < 0.0:
+                self._left_out.add(self._table.name, "the range is below zero", self._out.lines[row])
+            elif not anchor:
                 self._left_out.add(self._table.name, "the range has no anchor", self._out.lines[row])
             elif is_mixed and self._last.get(anchor) == value:
                 self._out.held += 1

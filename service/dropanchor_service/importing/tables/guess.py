@@ -1,7 +1,7 @@
 """Guess from the names of columns what they hold: `acc_x [g]`, `gyro_x_dps`, `distance_mm`, `linear_acceleration.x`."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, PRESSURE, RANGE, ImportingError
@@ -9,7 +9,7 @@ from dropanchor_service.importing.tables.mapping import ANCHOR, POSITION, T_NSEC
 from dropanchor_service.importing.tables.units import SI, known
 
 _SENSORS = {
-    ACC: {"a", "acc", "accel", "accelerometer", "acceleration", "accelerations", "accelero", "lsm6acc"},
+    ACC: {"a", "acc", "accel", "accelerometer", "acceleration", "accelerations", "accelero", "lsm6acc", "force"},
     GYRO: {"g", "w", "gyr", "gyro", "gyros", "gyroscope", "omega", "angular", "rotation", "rot"},
     MAG: {"m", "mag", "magn", "magnet", "magnetometer", "magnetic", "b", "compass"},
 }
@@ -41,7 +41,7 @@ _TIMES_WITH_UNIT = {
 }
 _OF_TIMES = {"header", "field", "unix", "utc", "sensor", "system", "sys", "device", "host", "since", "start", "boot"}
 _OF_TIMES |= {"log", "elapsed", "local", "gps", "imu", "uwb", "recv", "received", "sample", "of", "iso", "monotonic"}
-_OF_TIMES |= {"day"}
+_OF_TIMES |= {"day", "in", "fine", "utctime"}
 _NANOSECONDS = {"nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"}
 _RANGES = {"range", "ranges", "dist", "distance", "distances", "d", "r", "uwb", "tof", "twr", "measured", "measurement"}
 _RANGES |= {"rng", "slant", "ranging", "value"}
@@ -59,6 +59,15 @@ _BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+|°/?s?")
 
 
+_ROSTOPIC = "field."  # rostopic echo -p puts it before each name
+_G_FORCE = re.compile(r"^g[ _-]?f(?:orce)?[ _-]?[xyz]$", re.IGNORECASE)
+_UNITS_OF_SENSORS = {
+    GYRO: re.compile(r".*(?:/s|s-1|s\^-1|dps)"),
+    MAG: re.compile(r"[unmµμ]?T|m?gauss", re.IGNORECASE),
+    ACC: re.compile(r"m?g|.*/s(?:2|²|\^2)", re.IGNORECASE),
+}
+
+
 class _Found(NamedTuple):
     """field: of the mapping. unit: as the name tells it. rank: the smaller, the better."""
 
@@ -68,7 +77,7 @@ class _Found(NamedTuple):
 
 
 def guessed(columns: Sequence[str], table: str = "") -> dict[str, Column]:
-    """Return the columns by field. Raises ImportingError for a name with a unit that is not known.
+    """Return the columns by field. Raises ImportingError for a reading with a unit that is not known.
 
     table: its name, which tells what columns are that are only named x, y and z.
     """
@@ -86,18 +95,18 @@ def guessed(columns: Sequence[str], table: str = "") -> dict[str, Column]:
         fields[ANCHOR] = Column(names[0])
     if RANGE in fields or ANCHOR in fields:
         fields = {field: column for field, column in fields.items() if not field.startswith(WIDE)}
+    return whole(fields)
+
+
+def whole(fields: Mapping[str, Column]) -> dict[str, Column]:
+    """Return the fields that are of use, in their usual order."""
     return {field: fields[field] for field in sorted(fields, key=_order) if _is_whole(field, fields)}
-
-
-def guessed_time(columns: Sequence[str]) -> dict[str, Column]:
-    """Return only the columns with the time."""
-    return {field: column for field, column in guessed(columns).items() if field in (T, T_NSEC)}
 
 
 def is_anchors(columns: Sequence[str]) -> bool:
     """Return whether a table holds the positions of anchors."""
     names = {name.strip().lower() for name in columns}
-    return {"x", "y"} <= names and bool(names & {"id", "anchor", "anchor_id", "name"}) and not guessed_time(columns)
+    return {"x", "y"} <= names and bool(names & {"id", "anchor", "anchor_id", "name"}) and T not in guessed(columns)
 
 
 def position_columns(columns: Sequence[str]) -> dict[str, Column]:
@@ -107,7 +116,7 @@ def position_columns(columns: Sequence[str]) -> dict[str, Column]:
     return {"id": Column(identifier)} | {axis: Column(names[axis]) for axis in POSITION[1:] if axis in names}
 
 
-def _is_whole(field: str, fields: dict[str, Column]) -> bool:
+def _is_whole(field: str, fields: Mapping[str, Column]) -> bool:
     """Return whether the field is of use: a vector needs its three axes, a deviation its value."""
     vector = next((names for names in VECTORS.values() if field in names), ())
     if field == "heading_std":
@@ -122,11 +131,15 @@ def _order(field: str) -> int:
 
 def _found(name: str) -> _Found | None:
     """Return what a column holds, with the unit in brackets or at the end of its name."""
+    name = name.removeprefix(_ROSTOPIC)
     bracketed = _BRACKETS.match(name)
     if bracketed and bracketed[1] and not bracketed[2].isdigit():
-        found = _identified(_words(bracketed[1]))
+        words = words_of_name(bracketed[1])
+        found = _identified(words) or _by_unit(words, bracketed[2])
         return found and _with_unit(found, bracketed[2], name)
-    words = _words(name)
+    words = words_of_name(name)
+    if _G_FORCE.search(name) and words[-1][-1] in _AXES:  # always with gravity, where others beside it may lack it
+        return _Found(VECTORS[ACC][_AXES[words[-1][-1]]], "g", -1)
     if _NANOSECONDS & set(words):
         return _time(words)
     for count in (3, 2, 1):  # words of a unit at the end, as in gyro_x_rad_s
@@ -138,17 +151,31 @@ def _found(name: str) -> _Found | None:
     return _identified(words)
 
 
+def _by_unit(words: list[str], unit: str) -> _Found | None:
+    """Return the axis of a sensor that only its unit tells, as `AsX(°/s)` and `HX(uT)`."""
+    of_sensor = (quantity for quantity, units in _UNITS_OF_SENSORS.items() if units.fullmatch(unit))
+    quantity = next(of_sensor, None) if known(unit, MAG) or known(unit, ACC) or known(unit, GYRO) else None
+    axis = words[-1][-1] if words and not _NOT_A_READING & set(words) else ""
+    return (
+        None
+        if quantity is None or axis not in "xyz" or not axis
+        else _Found(VECTORS[quantity]["xyz".index(axis)], None, 5)
+    )
+
+
 def _of_table(table: str, name: str) -> _Found | None:
     """Return what a column holds that names only an axis, by the name of its table."""
-    words = _words(_BRACKETS.sub(r"\1", name))
+    words = words_of_name(_BRACKETS.sub(r"\1", name))
     bare = bool(words) and words[-1] in _AXES and set(words[:-1]) <= _BARE
-    return _vector([*(word for word in _words(table) if len(word) > 2), words[-1]]) if bare else None
+    return _vector([*(word for word in words_of_name(table) if len(word) > 2), words[-1]]) if bare else None
 
 
-def _with_unit(found: _Found, unit: str, name: str) -> _Found:
+def _with_unit(found: _Found, unit: str, name: str) -> _Found | None:
     quantity = quantity_of(found.field)
     if quantity is None or not unit:
         return found
+    if known(unit, quantity) is None and found.field == T:
+        return None  # T(°C) is a temperature
     if known(unit, quantity) is None:
         raise ImportingError(
             f"the column {name!r} has the unit {unit!r}, which is not known: say with --map what it is, as "
@@ -157,7 +184,8 @@ def _with_unit(found: _Found, unit: str, name: str) -> _Found:
     return found._replace(unit=unit)
 
 
-def _words(name: str) -> list[str]:
+def words_of_name(name: str) -> list[str]:
+    """Return the words of the name of a column, in lower case."""
     return [word.lower() for word in _WORDS.findall(name.replace("°/s", " dps ").replace("µ", "u"))]
 
 
@@ -189,6 +217,8 @@ def _time(words: list[str]) -> _Found | None:
     unit = next((_TIMES_WITH_UNIT[word] for word in words if word in _TIMES_WITH_UNIT), None)
     if (unit is None and not found & _TIMES) or not found <= _TIMES | set(_TIMES_WITH_UNIT) | _OF_TIMES:
         return None
+    if {"sample", "fine"} <= found:  # of Xsens, in steps of 0.1 ms
+        unit = "us*100"
     return _Found(T, unit or None, len(words) + 10 * ("elapsed" in found))
 
 
@@ -221,4 +251,4 @@ def _wide(words: list[str]) -> _Found | None:
 def unused(columns: Iterable[str], fields: dict[str, Column]) -> list[str]:
     """Return the columns that no field uses."""
     used = {column.name for column in fields.values()}
-    return [column for column in columns if column not in used]
+    return [column for column in columns if column and column not in used]

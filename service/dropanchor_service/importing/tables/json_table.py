@@ -11,7 +11,7 @@ from dropanchor_service.importing.files import File
 from dropanchor_service.importing.progress import shown
 from dropanchor_service.importing.readings import ImportingError, LeftOut
 from dropanchor_service.importing.tables.flat import flat_rows
-from dropanchor_service.importing.tables.table import Row
+from dropanchor_service.importing.tables.table import RANGE_ADVICE, Row
 
 _SAMPLE = 2_000
 _MAX_LIST_BYTES = 2**30
@@ -27,10 +27,7 @@ class JsonTable:
     file: File
     is_list: bool
     notes: tuple[str, ...] = ()
-
-    @property
-    def anchor_advice(self) -> str:
-        return "--map range.ID=COLUMN names another one"
+    anchor_advice: str = RANGE_ADVICE
 
     def rows(self, left_out: LeftOut) -> Iterator[Row]:
         """Yield the rows of each object. Raises ImportingError."""

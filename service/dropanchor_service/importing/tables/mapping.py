@@ -64,12 +64,15 @@ class ColumnMap:
 
 
 def parsed(words: Iterable[str]) -> ColumnMap:
-    """Return the mapping of the words of `--map`: [SOURCE/]FIELD=[-]COLUMN[:UNIT]. Raises ImportingError."""
+    """Return the mapping of the words of `--map`: [SOURCE/]FIELD=[-]COLUMN[:UNIT]. Raises ImportingError.
+
+    Without a column the field is not read.
+    """
     mapping = ColumnMap()
     for word in words:
         key, equals, column = word.partition("=")
         match = _KEY.fullmatch(key)
-        if not equals or not column or match is None:
+        if not equals or match is None:
             raise ImportingError(
                 f"--map: {word!r} is not FIELD=COLUMN or FIELD=COLUMN:UNIT (a SOURCE stands before --map)"
             )

@@ -1,5 +1,6 @@
 """Readings of a table by a mapping, told or guessed."""
 
+import shlex
 from array import array
 from collections.abc import Mapping
 
@@ -18,10 +19,11 @@ from dropanchor_service.importing.readings import (
     stream_of,
 )
 from dropanchor_service.importing.tables.collect import ONLY_ANCHOR, Collected, Kind, collected
-from dropanchor_service.importing.tables.guess import guessed, guessed_time, is_anchors, position_columns, unused
+from dropanchor_service.importing.tables.guess import is_anchors, position_columns, unused, whole
 from dropanchor_service.importing.tables.mapping import (
     ANCHOR,
     POSITION,
+    QUANTITIES,
     T_NSEC,
     VECTORS,
     WIDE,
@@ -34,20 +36,48 @@ from dropanchor_service.importing.tables.mapping import (
 from dropanchor_service.importing.tables.table import Table, number, text_of
 from dropanchor_service.importing.tables.times import Times, past_midnight, times_of
 from dropanchor_service.importing.tables.units import SI, conversion
+from dropanchor_service.importing.tables.values import Sampled, counter_of, decided, may_be_ranges
 from dropanchor_tag_client.recording.recording import Rows
 
 _NEEDED = {RANGE, *(names[0] for names in VECTORS.values()), "heading"}
 
 
 def fields_of(table: Table, told: Mapping[str, str]) -> dict[str, Column]:
-    """Return the columns of a table by field: those that were told, or else guessed. Raises ImportingError.
+    """Return the columns of a table by field: those that were told, the others guessed. Raises ImportingError.
 
-    told: for each field the text that names its column. Those that the table does not have are left out.
+    told: for each field the text that names its column, or nothing where it is not to be read. Those that the table
+    does not have are left out.
     """
-    if not told:
-        return guessed(table.columns, table.name)
-    fields = {name: column for name, text in told.items() if (column := resolved(text, table.columns, name))}
-    return (guessed_time(table.columns) | fields) if fields and T not in fields else fields
+    columns = told_of(table, told)
+    taken = [column.name for column in columns.values()]
+    complete = T in columns and {*VECTORS["acc"], *VECTORS["gyro"], RANGE, ANCHOR} <= set(columns)
+    fields = {} if complete else decided(Sampled(table), taken)
+    is_wide = any(name.startswith(WIDE) for name in columns)
+    replaced = {T_NSEC} if T in columns else set()
+    replaced |= {RANGE, ANCHOR} if is_wide else set()
+    replaced |= {name for name in fields if name.startswith(WIDE)} if RANGE in columns else set()
+    replaced |= {name for name, text in told.items() if not text}
+    return whole({name: column for name, column in fields.items() if name not in replaced} | columns)
+
+
+def told_of(table: Table, told: Mapping[str, str]) -> dict[str, Column]:
+    """Return the columns of this table that were told. Raises ImportingError."""
+    return {name: column for name, text in told.items() if (column := resolved(text, table.columns, name))}
+
+
+def why_unused(table: Table, fields: Fields) -> str:
+    """Return why nothing of a table is used, and what would change that."""
+    sampled = Sampled(table)
+    if T in fields:
+        return f"{table.name}: not used: only its time is known, of {', '.join(table.columns[:12])}"
+    readings = [column.name for name, column in fields.items() if name in QUANTITIES]
+    if not readings:
+        return f"{table.name}: not used: its columns {', '.join(table.columns[:12])} hold no known reading"
+    counter = counter_of(sampled)
+    word = f"{table.name}/t={counter}:s/100" if counter else f"{table.name}/t=COLUMN:s"
+    rate = ", where 100 is the number of its rows in a second" if counter else ""
+    readings_of_it = ", ".join(readings[:9])
+    return f"{table.name}: not used: no column tells the time of {readings_of_it}: --map {shlex.quote(word)}{rate}"
 
 
 def is_useful(fields: Fields) -> bool:
@@ -92,9 +122,19 @@ def readings_of(table: Table, fields: Fields) -> Readings:
     t_ns, columns, rows = _columns(found.headings, times, found, table)
     readings.headings = headings_of(t_ns, columns, rows, readings.left_out)
     readings.units = _units(fields)
-    if left := unused(table.columns, dict(fields)):
-        readings.notes.append(f"{table.name}: not used: {', '.join(left[:12])}{', …' if len(left) > 12 else ''}")
+    readings.notes += _left(table, fields)
     return readings
+
+
+def _left(table: Table, fields: Fields) -> list[str]:
+    """Return a sentence on the columns that are not used, and one on those that may be ranges."""
+    left = unused(table.columns, dict(fields))
+    said = [f"{table.name}: not used: {', '.join(left[:12])}{', …' if len(left) > 12 else ''}"] if left else []
+    has_ranges = any(name == RANGE or name.startswith(WIDE) for name in fields)
+    if not has_ranges and (maybe := may_be_ranges(Sampled(table), left)):
+        words = " ".join(shlex.quote(f"{WIDE}{name}={name}:m") for name in maybe)
+        said.append(f"{table.name}: are {', '.join(maybe)} ranges? --map {words} says so")
+    return said
 
 
 def _times(found: Collected, fields: Fields) -> Times:

@@ -10,6 +10,8 @@ from dropanchor_service.importing.readings import LeftOut
 Row = tuple[int, Sequence[Any]]
 """Number of the line or message, and one value for each column; None or an empty text where there is none."""
 
+RANGE_ADVICE = "--map range.ID=COLUMN names another one"
+
 Exact = int | float | Decimal
 
 _EMPTY = {"", "nan", "null", "none", "na", "n/a", "-", "--", "inf", "-inf", "+inf"}

@@ -12,7 +12,7 @@ from typing import ClassVar
 from dropanchor_service.importing.files import File
 from dropanchor_service.importing.progress import shown
 from dropanchor_service.importing.readings import ImportingError, LeftOut
-from dropanchor_service.importing.tables.table import Row, number
+from dropanchor_service.importing.tables.table import RANGE_ADVICE, Row, number
 from dropanchor_service.importing.tables.times import iso_ns
 from dropanchor_tag_client.recording.bounded import lines_of
 
@@ -36,10 +36,7 @@ class TextTable:
     encoding: str
     separator: str
     first: int
-
-    @property
-    def anchor_advice(self) -> str:
-        return "--map range.ID=COLUMN names another one"
+    anchor_advice: str = RANGE_ADVICE
 
     def rows(self, left_out: LeftOut) -> Iterator[Row]:
         """Yield the rows that have a value for each column. Raises ImportingError."""
