@@ -34,6 +34,7 @@ from dropanchor_service.estimation.columns import (
     POSE,
     RANGE,
     Engine,
+    FollowsAnchors,
     SampleBatch,
     State,
     default_settings,
@@ -212,6 +213,8 @@ def _run(engine: Engine) -> None:
     for row, settings in enumerate((unknown_start, known_start)):
         engine.configure(row, settings)
     engine.process(_moving_off(2))
+    if isinstance(engine, FollowsAnchors):
+        engine.move_anchors(np.ones(1, ANCHOR))
 
 
 def _moving_off(rows: int) -> SampleBatch:

@@ -282,6 +282,14 @@ class DeniesStarts(Protocol):
 
 
 @runtime_checkable
+class FollowsAnchors(Protocol):
+    """An engine whose tracks go on when somebody corrects the place of an anchor."""
+
+    def move_anchors(self, anchors: Array) -> Array:
+        """Set ANCHOR, and let the tracks follow those that moved. Return the rows that have to start afresh."""
+
+
+@runtime_checkable
 class FollowsPressure(Protocol):
     """An engine that takes the weather out of pressures."""
 

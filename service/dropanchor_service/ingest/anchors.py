@@ -1,6 +1,7 @@
 """The anchors of all sites in one table, as the engine indexes them."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,13 @@ from dropanchor_service.settings.engine_columns import anchor_columns
 from dropanchor_service.store import ServedSite
 
 _NUMBER_BITS = 32  # of an anchor number
+
+
+class Change(NamedTuple):
+    """Whether an anchor of a site has moved, and whether one has turned."""
+
+    moved: bool
+    turned: bool
 
 
 class AnchorTable:
@@ -31,17 +39,17 @@ class AnchorTable:
         self._keys = np.zeros(0, np.int64)  # of the anchors that the sites have now: site and number, ascending
         self._of_keys = np.zeros(0, np.int32)  # their indices
 
-    def follow(self, site: ServedSite) -> bool:
-        """Take over the anchors of a site. Return whether one of them has moved or turned."""
+    def follow(self, site: ServedSite) -> Change:
+        """Take over the anchors of a site. Return what has changed of those that it had."""
         anchors = site.store.anchors_by_index()
         places, facings = anchor_columns(anchors), _facings(anchors)
         known = self._of(site.index)
         moved = bool((places[: len(known)] != self.places[known]).any())
-        moved |= not np.array_equal(facings[: len(known)], self.facings[known], equal_nan=True)
+        turned = not np.array_equal(facings[: len(known)], self.facings[known], equal_nan=True)
         self._append(np.full(len(places) - len(known), site.index, np.int32))
         self.places[self._of(site.index)], self.facings[self._of(site.index)] = places, facings
         self._find_by_number(site)
-        return moved
+        return Change(moved, turned)
 
     def restore(self, sites: Sequence[int]) -> None:
         """Give the anchors of an earlier table the same indices. Every site has to be followed again.

@@ -1,8 +1,7 @@
 """Run the engine so that it follows changes of the sites, and so that a fault of one row harms no other row."""
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence, Set
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from dropanchor_service.estimation.columns import (
     TAG_SETTINGS,
     Array,
     Engine,
+    FollowsAnchors,
     PoseBatch,
     Restorable,
     SampleBatch,
@@ -24,6 +24,7 @@ from dropanchor_service.ingest.decode import Decoded
 from dropanchor_service.ingest.lost_pose import lost_pose
 from dropanchor_service.ingest.measured_starts import MeasuredStarts, with_lasting_errors
 from dropanchor_service.ingest.norths import NorthWatch
+from dropanchor_service.ingest.quarantine import Quarantine
 from dropanchor_service.ingest.references import PressureReferences
 from dropanchor_service.ingest.starts import StartWatch
 from dropanchor_service.ingest.told_heights import ToldHeights
@@ -32,14 +33,6 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.store import ServedSite, Sites
 from dropanchor_service.store.records import enlarged
-
-FAULTS_BEFORE_QUARANTINE = 3
-QUARANTINE_NS = 10_000_000_000
-
-
-class _Faults(NamedTuple):
-    times: int
-    until_ns: int
 
 
 class GuardedEngine:
@@ -58,7 +51,7 @@ class GuardedEngine:
         self._settings = np.zeros(0, TAG_SETTINGS)  # by row
         self._has_configured = np.zeros(0, bool)  # by row
         self._has_units = False  # whether any tag has other units than ours
-        self._faults: dict[int, _Faults] = {}
+        self.quarantine = Quarantine()
         self._sensors = SensorCheck()
         self._starts = StartWatch(engine, sites.rows.start_news)
         self._measured = MeasuredStarts()
@@ -83,21 +76,24 @@ class GuardedEngine:
     def restore(self, state: dict[str, Array]) -> None:
         """Restore what `state` returned.
 
-        All rows of a site start afresh if one of its anchors has moved since, and single rows if their settings have
-        changed.
+        Rows start afresh if their settings have changed since, and those that cannot follow an anchor that has moved.
         """
         assert isinstance(self._engine, Restorable)
         self.follow_sites()
-        anchors, settings = state.pop("anchors"), state.pop("settings")
+        anchors, settings = self.anchors.places.copy(), state.pop("settings")
+        kept = state.pop("anchors")
+        anchors[: len(kept)] = kept
         self._sensors.columns = state.pop("checks")
-        moved = set(self.anchors.sites[: len(anchors)][self.anchors.places[: len(anchors)] != anchors].tolist())
+        self._engine.set_anchors(anchors)
         self._engine.restore(state)
+        moved = dict.fromkeys(self.anchors.sites[self.anchors.places != anchors].tolist())
+        afresh = self._move([self._sites[index] for index in moved])
         self._settings = settings
         self._has_units = has_units(settings)
         for row, known in enumerate(settings):
             current = self._current(row)
             unchanged = current.columns().tobytes() == known.tobytes()
-            if unchanged and self._sites.of_row(row).index not in moved:
+            if unchanged and row not in afresh:
                 self._note(row, current)
                 self._starts.resume(row, current.tag)
                 self._norths.tell(row, current.tag)
@@ -117,23 +113,36 @@ class GuardedEngine:
     def follow_sites(self) -> list[ServedSite]:
         """Apply the changes of the sites since the last call. Return the sites that have changed.
 
-        All rows of a site start afresh if one of its anchors has moved, and single rows if their settings have changed.
+        Tracks follow an anchor that has moved. All rows of a site start afresh if one of its anchors has turned, and
+        single rows if their settings have changed.
         """
         changed = self._sites.take_changed()
-        moved = [self.anchors.follow(site) for site in changed]
-        if changed:
-            self._engine.set_anchors(self.anchors.places)
-        for site, has_moved in zip(changed, moved, strict=True):
-            self._follow_settings(site, restart=has_moved)
+        changes = [self.anchors.follow(site) for site in changed]
+        if not changed:
+            return changed
+        afresh = self._move([site for site, change in zip(changed, changes, strict=True) if change.moved])
+        for site, change in zip(changed, changes, strict=True):
+            self._follow_settings(site, afresh, restart=change.turned)
         return changed
 
-    def _follow_settings(self, site: ServedSite, restart: bool) -> None:
-        """Apply the settings of the tags of a site. restart: start all of its rows afresh."""
+    def _move(self, moved: Sequence[ServedSite]) -> set[int]:
+        """Let the engine follow the anchors. Return the rows to start afresh. moved: sites whose anchors did."""
+        if not isinstance(self._engine, FollowsAnchors):
+            self._engine.set_anchors(self.anchors.places)
+            return {tag.row for site in moved for tag in site.tags.all()}
+        afresh = set(self._engine.move_anchors(self.anchors.places).tolist())
+        self._starts.end_left()
+        return afresh
+
+    def _follow_settings(self, site: ServedSite, afresh: Set[int], restart: bool) -> None:
+        """Apply the settings of the tags of a site. afresh: rows that lost their track. restart: start all afresh."""
         for tag in site.tags.all():
             configured, current = self._configured.get(tag.row), self._current(tag.row)
             if configured is None:
                 continue
-            if not restart and current.is_turned_from(configured):
+            if tag.row in afresh and not restart:
+                self._configure(tag.row, start_known=not isinstance(self._engine, FollowsAnchors))
+            elif not restart and current.is_turned_from(configured):
                 self._turn(tag.row, current)
             elif restart or current.matters_after(configured):
                 self._configure(tag.row)
@@ -151,15 +160,6 @@ class GuardedEngine:
     def anchor_indices(self, rows: Array, numbers: Array) -> Array:
         """Return the engine's index for each anchor number that the tag of a row sent, -1 if its site lacks it."""
         return self.anchors.indices(self._sites.rows.sites(rows), numbers)
-
-    def any_quarantined(self, now_ns: int) -> bool:
-        """Return whether any row is in quarantine."""
-        return any(faults.until_ns > now_ns for faults in self._faults.values())
-
-    def quarantined(self, rows: Array, now_ns: int) -> Array:
-        """Return which of the rows are in quarantine, because their samples made the engine fail repeatedly."""
-        quarantined = [row for row, faults in self._faults.items() if faults.until_ns > now_ns]
-        return np.isin(rows, quarantined) if quarantined else np.zeros(len(rows), bool)
 
     def prepare(self, row: int) -> None:
         """Configure a row before its first message arrives, so that the message does not wait for it."""
@@ -242,9 +242,7 @@ class GuardedEngine:
     def _fault(self, row: int, samples: SampleBatch, error: Exception, now_ns: int) -> PoseBatch:
         self._metrics.faults["estimator"].inc()
         self._log.exception(f"estimator of tag {self._sites.rows.at(row).name}", error)
-        times = self._faults.get(row, _Faults(0, 0)).times + 1
-        quarantine = times % FAULTS_BEFORE_QUARANTINE == 0
-        self._faults[row] = _Faults(times, now_ns + QUARANTINE_NS if quarantine else 0)
+        self.quarantine.note(row, now_ns)
         self._configure(row, start_known=False)
         t_ns = max(int(column["t_ns"].max()) for column in samples.columns() if len(column))
         return PoseBatch(poses=lost_pose(row, t_ns))

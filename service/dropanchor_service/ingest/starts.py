@@ -60,6 +60,13 @@ class StartWatch:
         if row < len(self._starts) and self._starts["is_open"][row]:
             self._close(row, StartPhase.ENDED)
 
+    def end_left(self) -> None:
+        """Stop following rows that begin again elsewhere, because an anchor was corrected."""
+        rows = np.flatnonzero(self._starts["is_open"])
+        if self._engine is not None and len(rows):
+            for row in rows[~self._engine.are_at_start(rows)].tolist():
+                self._close(row, StartPhase.ENDED)
+
     def look(self, batch: PoseBatch) -> None:
         """Compare new poses with the starts that are open."""
         if self._engine is None or not self._count:

@@ -194,13 +194,13 @@ class Ingest:
         self._metrics.estimator_seconds.observe(time.perf_counter() - started)
 
     def _outside_quarantine(self, samples: SampleBatch, now_ns: int) -> SampleBatch:
-        if not self._engine.any_quarantined(now_ns):
+        if not self._engine.quarantine.holds_any(now_ns):
             return samples
         columns = zip(KINDS, samples.columns(), strict=True)
         return SampleBatch(*(self._accepted(column, kind.name, now_ns) for kind, column in columns))
 
     def _accepted(self, column: Array, kind: str, now_ns: int) -> Array:
-        quarantined = self._engine.quarantined(column["row"], now_ns)
+        quarantined = self._engine.quarantine.holds(column["row"], now_ns)
         self._rejections.count_rejected(Reason.ESTIMATOR_FAULT, column["row"][quarantined], kind)
         accepted: Array = column[~quarantined] if quarantined.any() else column
         return accepted

@@ -53,10 +53,59 @@ def drag(
     page.page.mouse.up()
 
 
+def confirm(page: WatchedPage) -> None:
+    page.page.get_by_role("form", name="Place the anchor").get_by_role("button", name="Move").click()
+
+
+@pytest.mark.parametrize(
+    ("language", "edit", "form", "question", "move", "cancel"),
+    [
+        (
+            "en-GB",
+            "Set up anchors",
+            "Place the anchor",
+            "Move anchor 17 by 1.2 m: 2 tags are concerned.",
+            "Move",
+            "Cancel",
+        ),
+        (
+            *("de-DE", "Anker einrichten", "Anker platzieren"),
+            *("Anker 17 um 1,2 m verschieben: 2 Tags sind betroffen.", "Verschieben", "Abbrechen"),
+        ),
+    ],
+)
+def test_an_anchor_moves_only_when_somebody_has_seen_how_far_and_which_tags_that_concerns(
+    chromium: Browser, place: Place, language: str, edit: str, form: str, question: str, move: str, cancel: str
+) -> None:
+    place.move("cart", "lift", x=1.0, y=1.0)
+    with watched_page(chromium, place.url, locale=language) as page:
+        page.wait_for("dropanchor.tags().length === 2")
+        page.page.get_by_role("button", name=edit).click()
+        with page.page.expect_response(lambda response: "/anchors/17" in response.url):
+            page.page.get_by_role("button", name="17: ").click()
+        place_form = page.page.get_by_role("form", name=form)
+        for last in (cancel, move):
+            page.page.locator("#map").focus()
+            for key in ("Shift+ArrowRight", "ArrowRight", "ArrowRight"):
+                page.page.keyboard.press(key)
+            expect(place_form.get_by_role("status")).to_have_text(question)
+            assert anchors_of(place)["17"] == Anchor(id="17")
+            place_form.get_by_role("button", name=last).click()
+            if last == cancel:
+                page.wait_for("dropanchor.anchors()[0].x === 0")
+                with page.page.expect_response(lambda response: "/anchors/17" in response.url):
+                    page.page.get_by_role("button", name="17: ").click()
+        wait_until(lambda: anchors_of(place)["17"] == Anchor(id="17", x=1.2))
+        expect(place_form.get_by_role("status")).to_have_text("")
+        assert page.errors == []
+
+
 def test_a_dragged_anchor_moves_in_every_open_page_and_undo_moves_it_back(chromium: Browser, place: Place) -> None:
     with watched_page(chromium, place.url) as page, watched_page(chromium, place.url) as other:
         open_setup(page)
         drag(page, "17", 60, 30)
+        assert anchors_of(place)["17"] == Anchor(id="17")
+        confirm(page)
         outcome = page.page.locator("#outcome")
         expect(outcome).to_contain_text("Anchor 17 moved.")
         moved = anchors_of(place)["17"]
@@ -78,6 +127,7 @@ def test_arrow_keys_move_the_selected_anchor(chromium: Browser, place: Place) ->
         for key in ("ArrowRight", "ArrowRight", "Shift+ArrowUp"):
             page.page.keyboard.press(key)
         expect(panel.get_by_label("y", exact=False).nth(0)).to_have_value("1")
+        page.page.keyboard.press("Enter")
         wait_until(lambda: anchors_of(place)["17"] == Anchor(id="17", x=0.2, y=1.0))
         assert page.errors == []
 
@@ -88,6 +138,7 @@ def test_a_drag_over_a_change_of_another_page_asks_whose_is_kept(chromium: Brows
         select(page, open_setup(page), "17")
         outcome = page.page.locator("#outcome")
         drag(page, "17", 60, 0, lambda: place.bench.answers.site.set_anchor(newer))
+        confirm(page)
         expect(outcome).to_contain_text("Somebody else changed this meanwhile")
         assert anchors_of(place)["17"] == newer
         with page.page.expect_response(lambda response: "/anchors/17" in response.url):
@@ -95,11 +146,13 @@ def test_a_drag_over_a_change_of_another_page_asks_whose_is_kept(chromium: Brows
         page.wait_for("dropanchor.anchors()[0].x === 3 && dropanchor.drawing().still")
         newest = Anchor(id="17", x=3.5, y=1.0)
         drag(page, "17", -40, 0, lambda: place.bench.answers.site.set_anchor(newest))
+        confirm(page)
         outcome.get_by_role("button", name="Keep mine").click()
         wait_until(lambda: anchors_of(place)["17"].x < 3.0)
         page.wait_for("dropanchor.anchors()[0].x < 3 && dropanchor.drawing().still")
         expect(outcome).not_to_contain_text("Somebody else")
         drag(page, "17", 0, 60)
+        confirm(page)
         wait_until(lambda: anchors_of(place)["17"].y > 1.2)
         assert all("412" in error for error in page.errors)
 

@@ -21,7 +21,7 @@ def test_no_violation_while_a_site_is_set_up(chromium: Browser, place: Place, ax
         form = page.page.get_by_role("form", name="Place the anchor")
         form.get_by_label("x").fill("2")
         place.bench.answers.site.set_anchor(Anchor(id="17", x=1.0))
-        form.get_by_role("button", name="Save").click()
+        form.get_by_role("button", name="Move").click()
         expect(page.page.get_by_role("button", name="Take the newer one")).to_be_visible()
         assert_no_violation(page, axe)
         form.get_by_role("button", name="Delete…").click()

@@ -163,7 +163,7 @@ test("a deletion that waits is tried until the service can be reached", async (t
   assert.equal(changes.isLeaving("destinations/mail"), false);
 });
 
-test("an anchor that arrow keys have moved is saved before a new one begins", async () => {
+test("an anchor that arrow keys have moved stays where it is until that is saved", async () => {
   const { AnchorEditor } = await import("../../../service/dropanchor_service/dashboard/setup/anchors.js");
   const saved = [];
   const changes = { read: async () => ({ value: {}, etag: "e" }), edit: async (_what, path, { x }) => (saved.push([path, x]), true) };
@@ -172,7 +172,8 @@ test("an anchor that arrow keys have moved is saved before a new one begins", as
   editor.open();
   editor.select("a");
   editor.key({ key: "ArrowRight", shiftKey: false });
-  editor.add();
-  await new Promise((resolve) => setImmediate(resolve));
-  assert.deepEqual([saved, editor.draft.id], [[["anchors/a", 1.1]], ""]);
+  editor.drop();
+  assert.deepEqual([saved, editor.isUnsaved, editor.origin.x], [[], true, 1]);
+  await editor.save();
+  assert.deepEqual([saved, editor.isUnsaved, editor.origin], [[["anchors/a", 1.1]], false, null]);
 });

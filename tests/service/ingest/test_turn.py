@@ -19,7 +19,7 @@ from dropanchor_service.answers.answers import Answers
 from dropanchor_service.estimation.columns import SampleBatch, State, StateReason
 from dropanchor_service.ingest import samples as sample_reader
 from dropanchor_service.ingest.decode import Forms, read_forms
-from dropanchor_service.ingest.guarded_engine import FAULTS_BEFORE_QUARANTINE
+from dropanchor_service.ingest.quarantine import FAULTS_BEFORE_QUARANTINE
 from service.ingest.messages import S, T, ranges
 from support.ingest import IngestBench
 

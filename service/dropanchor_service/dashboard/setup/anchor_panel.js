@@ -1,6 +1,7 @@
 /** The panel of the anchors: a list, and a form for the one that is being edited. */
 
-import { place3 } from "../data/format.js";
+import { wayBetween } from "./anchors.js";
+import { distance, place3 } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { nameKey } from "../data/order.js";
 import { readMeasure, writeMeasure } from "../data/units.js";
@@ -11,14 +12,15 @@ const FIELDS = /** @type {const} */ (["x", "y", "z"]);
 export class AnchorPanel {
   /** @param {HTMLElement} panel @param {HTMLButtonElement} toggle @param {HTMLDialogElement} dialog
    * @param {import("./anchors.js").AnchorEditor} editor @param {import("../data/changes.js").Changes} changes
-   * @param {import("../page/one_panel.js").Panels} panels */
-  constructor(panel, toggle, dialog, editor, changes, panels) {
+   * @param {import("../page/one_panel.js").Panels} panels @param {import("../data/fleet.js").Fleet} fleet */
+  constructor(panel, toggle, dialog, editor, changes, panels, fleet) {
     this.panel = panel;
     this.toggle = toggle;
     this.editor = editor;
     this.changes = changes;
     this.dialog = dialog;
     this.panels = panels;
+    this.fleet = fleet;
     this.list = this.#part("list");
     this.form = /** @type {HTMLFormElement} */ (this.#part("form"));
     panels.add("anchors", { isOpen: () => editor.isOpen, isUnsaved: () => editor.isUnsaved, leave: () => editor.close() });
@@ -71,11 +73,19 @@ export class AnchorPanel {
     this.#fillList();
     this.form.hidden = draft === null;
     this.#part("delete").hidden = editor.isNew || !changes.mayDelete;
-    this.#part("save").textContent = t(editor.isNew ? "anchors.add_new" : "save");
+    const { origin } = editor;
+    this.#part("save").textContent = t(editor.isNew ? "anchors.add_new" : origin ? "anchors.move" : "save");
+    this.#part("moves").textContent = draft && origin ? this.#question(origin, draft) : "";
     this.#field("id").readOnly = !editor.isNew;
     if (!draft) return;
     if (this.#field("id").value !== draft.id) this.#field("id").value = draft.id;
     for (const name of FIELDS) writeMeasure(this.#field(name), draft[name]);
+  }
+
+  /** @param {import("./anchors.js").Anchor} from @param {import("./anchors.js").Anchor} to */
+  #question(from, to) {
+    const n = this.fleet.value.anchor.filter((anchor, row) => anchor === from.id && this.fleet.hasPose(row)).length;
+    return t("anchors.move_question", { id: from.id, way: distance(wayBetween(from, to), 3), n });
   }
 
   #fillList() {

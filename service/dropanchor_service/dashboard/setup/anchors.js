@@ -1,4 +1,4 @@
-/** Place, move, add and delete anchors. A draft is on the map only until it is saved or cancelled. */
+/** Place, move, add and delete anchors. A draft is on the map only until it is saved or cancelled: moving an anchor moves tags. */
 
 import { toCentimetre } from "./gestures.js";
 import { t } from "../i18n/language.js";
@@ -10,12 +10,13 @@ const REACH_PX = 18;
 const DRAG_PX = 4;
 const STEP_M = 0.1;
 const LARGE_STEP_M = 1;
-/** Arrow keys save once no other key has followed for this time. */
-const PAUSE_MS = 700;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /** @param {string} id */
 const pathOf = (id) => `anchors/${encodeURIComponent(id)}`;
+
+/** @param {Anchor} a @param {Anchor} b */
+export const wayBetween = (a, b) => Math.hypot(b.x - a.x, b.y - a.y, b.z - a.z);
 
 /** Event: "change". */
 export class AnchorEditor extends EventTarget {
@@ -32,8 +33,6 @@ export class AnchorEditor extends EventTarget {
   #isSaving = false;
   /** @type {Promise<Seen | null>} */
   #seen = Promise.resolve(null);
-  /** 0: nothing waits to be saved. */
-  #timer = 0;
   /** Where the draft was grabbed, and how far from its centre. */
   #grab = { px: 0, py: 0, dx: 0, dy: 0, moves: false };
 
@@ -55,9 +54,16 @@ export class AnchorEditor extends EventTarget {
     this.#changed();
   }
 
-  /** Whether something would be lost: what arrow keys and drags change is saved by itself. */
+  /** Whether something would be lost. */
   get isUnsaved() {
-    return this.#isDirty && !this.#isSaving && this.#timer === 0;
+    return this.#isDirty && !this.#isSaving;
+  }
+
+  /** Where the anchor of the draft stands until it is moved; null: the draft moves none. @returns {Anchor | null} */
+  get origin() {
+    const { draft } = this;
+    const known = this.isNew ? undefined : this.anchors.find(({ id }) => id === draft?.id);
+    return draft && known && wayBetween(known, draft) > 0 ? known : null;
   }
 
   open() {
@@ -66,7 +72,6 @@ export class AnchorEditor extends EventTarget {
   }
 
   close() {
-    if (this.#timer) this.save();
     this.isOpen = false;
     this.#discard();
     this.#changed();
@@ -76,7 +81,6 @@ export class AnchorEditor extends EventTarget {
   select(id) {
     const anchor = this.anchors.find((known) => known.id === id);
     if (!anchor || (this.draft?.id === id && !this.isNew)) return;
-    if (this.#timer) this.save();
     this.#discard();
     this.#edit(anchor);
     this.#changed();
@@ -84,7 +88,6 @@ export class AnchorEditor extends EventTarget {
 
   /** Begin a new anchor. @param {string} [id] @param {{x: number, y: number}} [place] m, by default the centre of the map */
   add(id = "", place = this.map.view) {
-    if (this.#timer) this.save();
     this.#discard();
     this.isNew = this.isOpen = true;
     this.draft = { id, x: toCentimetre(place.x), y: toCentimetre(place.y), z: 0 };
@@ -100,7 +103,6 @@ export class AnchorEditor extends EventTarget {
   }
 
   async save() {
-    this.#stopTimer();
     const { draft, isNew } = this;
     if (!draft || (!isNew && !this.#isDirty)) return;
     this.#isSaving = true;
@@ -156,9 +158,7 @@ export class AnchorEditor extends EventTarget {
     if (grab.moves) this.change({ x: toCentimetre(x + grab.dx), y: toCentimetre(y + grab.dy) });
   }
 
-  drop() {
-    if (!this.isNew) this.save();
-  }
+  drop() {}
 
   /** @param {KeyboardEvent} event */
   key(event) {
@@ -168,8 +168,6 @@ export class AnchorEditor extends EventTarget {
     if (!direction) return event.key === "Enter";
     const step = event.shiftKey ? LARGE_STEP_M : STEP_M;
     this.change({ x: toCentimetre(this.draft.x + step * direction[0]), y: toCentimetre(this.draft.y + step * direction[1]) });
-    this.#stopTimer();
-    if (!this.isNew) this.#timer = setTimeout(() => this.save(), PAUSE_MS);
     return true;
   }
 
@@ -193,13 +191,7 @@ export class AnchorEditor extends EventTarget {
     this.#changed();
   }
 
-  #stopTimer() {
-    clearTimeout(this.#timer);
-    this.#timer = 0;
-  }
-
   #discard() {
-    this.#stopTimer();
     this.draft = null;
     this.isNew = this.#isDirty = false;
   }

@@ -1,10 +1,19 @@
 /** Draw what is being set up: the anchor that is edited, and the start of a tag. */
 
+import { haloStroke } from "../map/draw_site.js";
+
 const ARROW_PX = 44;
 
 /** @param {CanvasRenderingContext2D} ctx @param {import("../map/view.js").View} view @param {import("../map/palette.js").Palette} palette
- * @param {import("../map/draw_site.js").Anchor} anchor */
-export function drawEditedAnchor(ctx, view, palette, anchor) {
+ * @param {import("../map/draw_site.js").Anchor} anchor @param {import("../map/draw_site.js").Anchor | null} origin where it stands until it is moved */
+export function drawEditedAnchor(ctx, view, palette, anchor, origin) {
+  if (origin) {
+    ctx.beginPath();
+    ctx.arc(view.screenX(origin.x), view.screenY(origin.y), 5, 0, 2 * Math.PI);
+    ctx.moveTo(view.screenX(origin.x), view.screenY(origin.y));
+    ctx.lineTo(view.screenX(anchor.x), view.screenY(anchor.y));
+    haloStroke(ctx, palette, palette.accent, 1.5, [4, 4]);
+  }
   ctx.beginPath();
   ctx.arc(view.screenX(anchor.x), view.screenY(anchor.y), 15, 0, 2 * Math.PI);
   ctx.lineWidth = 2.5;

@@ -26,13 +26,13 @@ export class Setup {
     const { changes, start } = this;
     this.anchors = new AnchorEditor(map, changes);
     const dialog = /** @type {HTMLDialogElement} */ (byId("confirm"));
-    this.anchorPanel = new AnchorPanel(byId("setup"), byId("edit"), dialog, this.anchors, changes, panels);
+    this.anchorPanel = new AnchorPanel(byId("setup"), byId("edit"), dialog, this.anchors, changes, panels, fleet);
     this.tagPanel = new TagPanel(byId("detail"), dialog, fleet, choice, changes, start, panels);
     this.addAnchor = new AddAnchor(byId("detail"), roster, choice, changes, (id) => this.anchorPanel.add(id));
     this.groups = new GroupFilter(/** @type {HTMLSelectElement} */ (byId("group")), fleet, choice);
     new Outcome(byId("outcome"), changes);
     map.overlays.push(({ ctx, view, palette }) => {
-      if (this.anchors.draft) drawEditedAnchor(ctx, view, palette, this.anchors.draft);
+      if (this.anchors.draft) drawEditedAnchor(ctx, view, palette, this.anchors.draft, this.anchors.origin);
       if (start.draft) drawStart(ctx, view, palette, start.draft);
     });
     giveTo(map, [start, this.anchors]);

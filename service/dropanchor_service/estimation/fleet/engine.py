@@ -20,6 +20,7 @@ from dropanchor_service.estimation.fleet.frontend.platform import PLATFORM
 from dropanchor_service.estimation.fleet.frontend.state import FRONTEND, start_frontend
 from dropanchor_service.estimation.fleet.lanes import Lanes
 from dropanchor_service.estimation.fleet.learned_north import have_own_north, learned_norths, turn_north
+from dropanchor_service.estimation.fleet.moved_anchors import follow_moved
 from dropanchor_service.estimation.fleet.outputs import (
     Part,
     doubted_of,
@@ -47,7 +48,7 @@ class _Run(NamedTuple):
 
 
 class FleetEngine:
-    """Implement `Engine`, `Restorable`, `DeniesStarts`, `FollowsPressure` and `LearnsNorth`.
+    """Implement `Engine`, `Restorable`, `DeniesStarts`, `FollowsAnchors`, `FollowsPressure` and `LearnsNorth`.
 
     A checkpoint copies the rows, the pool and the pending samples.
 
@@ -75,6 +76,11 @@ class FleetEngine:
     def set_anchors(self, anchors: Array) -> None:
         """Set ANCHOR, which the `anchor` columns of samples index."""
         self._anchors = anchors.astype(ANCHOR)
+
+    def move_anchors(self, anchors: Array) -> Array:
+        """Set ANCHOR, and let the tracks follow those that moved. Return the rows that have to start afresh."""
+        before, self._anchors = self._anchors, anchors.astype(ANCHOR)
+        return follow_moved(self._rows[: self._configured], self._pool, before, self._anchors[: len(before)])
 
     def configure(self, row: int, settings: Array) -> None:
         """Make `row` with these TAG_SETTINGS (0-d), or start it again with new ones."""
