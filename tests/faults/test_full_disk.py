@@ -2,6 +2,7 @@
 
 import resource
 import signal
+from contextlib import ExitStack
 from pathlib import Path
 
 from support.live_tags import LiveTags, is_current, samples_of
@@ -31,8 +32,9 @@ def test_on_a_full_disk_poses_continue_and_the_last_complete_checkpoint_is_used(
     config = tags.write_settings(tmp_path)
     options = ("--config", str(config), "--data-dir", str(tmp_path / "data"), "--zenoh-connect", endpoint)
     failed, written = (f'dropanchor_checkpoints_total{{outcome="{outcome}"}}' for outcome in ("failed", "written"))
-    with router_process(endpoint), tags:
+    with router_process(endpoint), ExitStack() as opened:
         with running_service(*options) as service:
+            opened.enter_context(tags)  # it asks the caches of tags that it does not know for their last 100 messages
             wait_until(lambda: is_current(service, TAGS) and service.metric(written) > 0)
             assert "checkpoint" not in impaired(service)
             set_file_limit(service, 0)
