@@ -131,6 +131,12 @@ def test_a_test_of_the_connection_is_welcome() -> None:
         assert make_phone().post(body) == 0
 
 
+def test_a_message_of_another_app_is_no_test_of_the_connection() -> None:
+    body = b'{"loggingTime": "2026-11-26 08:00:00.000 +0100", "accelerometerAccelerationX": "-0.01"}'
+    with pytest.raises(PhoneError, match="fields such as loggingTime, accelerometerAccelerationX, which are not those"):
+        make_phone().post(body)
+
+
 def test_times_as_text_and_values_beside_them_are_understood() -> None:
     phone = make_phone()
     readings = [

@@ -71,6 +71,7 @@ class Kind(Enum):
     IMAGE_NOT_UPLOADED = (409, "The image of the floor plan has not been uploaded")
     CHANGED_MEANWHILE = (412, "The resource is not the expected one")
     BODY_TOO_LARGE = (413, "The request body is too large")
+    UNKNOWN_CONTENT_ENCODING = (415, "The request body is packed in a way that the service does not read")
     OTHER_HOST = (421, "The service does not have this name")
     INVALID_REQUEST = (422, "The request is not valid")
     SHAPE_REFUSED = (422, "The shape cannot be a zone")

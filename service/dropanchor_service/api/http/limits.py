@@ -1,6 +1,7 @@
 """Limits that protect clients from each other: the size of bodies, and deadlines for requests and for reading."""
 
 import asyncio
+import zlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,9 +16,15 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problem_respo
 from dropanchor_service.api.http.open_sockets import OpenSockets
 from dropanchor_service.api.http.site_in_path import divided, is_omlox
 
+_UNPACKED = ("gzip", "x-gzip", "deflate")
+_OF_PACKED = (b"content-encoding", b"content-length")
+
 
 class BodyLimit:
-    """ASGI middleware that answers 413 to a larger body, by its `content-length` or once it has grown too large."""
+    """ASGI middleware that answers 413 to a larger body, by its `content-length` or once it has grown too large.
+
+    It unpacks gzip and deflate, and answers 415 to any other content encoding.
+    """
 
     def __init__(self, app: ASGIApp, max_bytes: int, of_paths: Mapping[str, int] | None = None) -> None:
         """max_bytes: of the paths that are not in of_paths."""
@@ -35,7 +42,44 @@ class BodyLimit:
             response = problem_response(Request(scope), Kind.BODY_TOO_LARGE, _too_large(max_bytes))
             await response(scope, receive, send)
             return
-        await self._app(scope, _counted(receive, max_bytes), send)
+        packing = Headers(scope=scope).get("content-encoding", "identity").strip().lower()
+        if packing == "identity":
+            await self._app(scope, _counted(receive, max_bytes), send)
+        elif packing in _UNPACKED:
+            headers = [(name, value) for name, value in scope["headers"] if name.lower() not in _OF_PACKED]
+            unpacked = _unpacked(receive, packing, max_bytes)
+            await self._app({**scope, "headers": headers}, _counted(unpacked, max_bytes), send)
+        else:
+            detail = say(
+                "content_encoding",
+                "The Content-Encoding {packing} is not read: gzip, deflate or none is.",
+                packing=packing,
+            )
+            await problem_response(Request(scope), Kind.UNKNOWN_CONTENT_ENCODING, detail)(scope, receive, send)
+
+
+def _unpacked(receive: Receive, packing: str, max_bytes: int) -> Receive:
+    """Return the messages with their bodies unpacked, to a little more than `max_bytes` at most."""
+    unpacker = zlib.decompressobj(zlib.MAX_WBITS | 32)  # of gzip and of zlib, whichever it is
+
+    async def unpacked() -> Message:
+        message = await receive()
+        try:
+            body = unpacker.decompress(message.get("body", b""), max_bytes + 1)
+        except zlib.error:
+            raise ProblemError(Kind.INVALID_REQUEST, _not_packed(packing)) from None
+        is_whole = (
+            unpacker.eof or unpacker.unconsumed_tail or message.get("more_body") or message["type"] != "http.request"
+        )
+        if not is_whole:
+            raise ProblemError(Kind.INVALID_REQUEST, _not_packed(packing))
+        return {**message, "body": body}
+
+    return unpacked
+
+
+def _not_packed(packing: str) -> str:
+    return say("not_packed", "The body is not whole {packing}, which Content-Encoding says it is.", packing=packing)
 
 
 def _counted(receive: Receive, max_bytes: int) -> Receive:

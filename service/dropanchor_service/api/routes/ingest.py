@@ -99,13 +99,14 @@ def _add_samples_route(router: APIRouter) -> None:
         operation_id="ingest_samples",
         summary="Send samples of a tag",
         description="One payload of the contract, chosen by Content-Type as over Zenoh by the encoding, of at most "
-        "65,536 bytes. It is treated as if it had come over Zenoh: order, clocks, admission and counters are the same. "
+        "65,536 bytes; the body may be packed (Content-Encoding: gzip or deflate). It is treated as if it had come "
+        "over Zenoh: order, clocks, admission and counters are the same. "
         "Times before 2015 that do not count from boot are refused: they are not UTC in ns. So is a tag that the site "
         "does not admit (`unknown_tags`).",
         status_code=202,
         response_model=SamplesReceived,
         responses=example_response({"samples": 1}, 202)
-        | problems(Kind.INVALID_REQUEST, Kind.SAMPLES_REJECTED, Kind.BODY_TOO_LARGE),
+        | problems(Kind.INVALID_REQUEST, Kind.SAMPLES_REJECTED, Kind.BODY_TOO_LARGE, Kind.UNKNOWN_CONTENT_ENCODING),
         openapi_extra={"requestBody": {"required": True, "content": _SAMPLES_BODY}},
     )
     async def ingest_samples(request: Request, query: Annotated[OfTag, Query()]) -> Response:

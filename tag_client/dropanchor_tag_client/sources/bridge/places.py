@@ -1,12 +1,14 @@
 """What a rule takes a value from: a path in the payload, a fixed text, or a text with places such as {1}."""
 
 import re
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 _PLACE = re.compile(r"\{([^{}]*)\}")
 _LEVEL = re.compile(r"topic\[(\d{1,4})\]")
 _PATH = re.compile(r"(?!topic(\W|$))[^\W\d][\w@$ -]*(\.[\w@$ -]+)*")
 _MAX_SHOWN = 60
+EACH = "[]"
 
 
 class UnusableError(Exception):
@@ -16,14 +18,36 @@ class UnusableError(Exception):
 class Element(NamedTuple):
     """What a rule looks at: a message or, with `each`, one element of a list or object in it.
 
-    topic: of the message. wildcards: what each + of the filter stands for. key: name or index of the element.
+    topic: of the message. wildcards: what each + of the filter stands for. around: what encloses the part, the message
+    last. key: name of the element, or its index where no list around it has a name.
     """
 
     topic: str
     wildcards: list[str]
-    payload: Any
+    around: tuple[Any, ...]
     part: Any
     key: str = ""
+    is_index: bool = False
+
+    def elements(self, path: str) -> "list[Element]":
+        """Return the elements at a path: of a list or an object, or of each of several, as in `tags[].ranges`."""
+        found = [self]
+        for step in path.removesuffix(EACH).split(EACH):
+            found = [inner for one in found for inner in one._elements(step.removeprefix("."))]
+        return found
+
+    def _elements(self, path: str) -> "list[Element]":
+        value = at(self.part, path) if path else self.part
+        if not isinstance(value, list | dict):
+            raise UnusableError(f"the payload has no list {path}" if path else "the payload is no list")
+        around = (self.part, *self.around)
+        if isinstance(value, dict):
+            return [self._replace(around=around, part=part, key=key, is_index=False) for key, part in value.items()]
+        if self.key and not self.is_index:
+            return [self._replace(around=around, part=part) for part in value]
+        return [
+            self._replace(around=around, part=part, key=str(index), is_index=True) for index, part in enumerate(value)
+        ]
 
     def value(self, source: str) -> Any:
         """Return what a source names. Raises UnusableError."""
@@ -35,11 +59,11 @@ class Element(NamedTuple):
         return self.text(source) if "{" in source else at(self.part, source)
 
     def value_beside(self, source: str) -> Any:
-        """Return what a source names in the element or, if it is not there, in the payload. Raises UnusableError."""
-        try:
-            return self.value(source)
-        except UnusableError:
-            return self._replace(part=self.payload).value(source)
+        """Return what a source names in the element, or else in what encloses it. Raises UnusableError."""
+        for part in (self.part, *self.around[:-1]):
+            with suppress(UnusableError):
+                return self._replace(part=part).value(source)
+        return self._replace(part=self.around[-1]).value(source)
 
     def text(self, template: str) -> str:
         """Return a text with its places filled in. Raises UnusableError."""
@@ -61,10 +85,10 @@ class Element(NamedTuple):
         return levels[int(level[1])]
 
     def _beside(self, path: str) -> Any:
-        try:
-            return at(self.part, path)
-        except UnusableError:
-            return at(self.payload, path)
+        for value in (self.part, *self.around[:-1]):
+            with suppress(UnusableError):
+                return at(value, path)
+        return at(self.around[-1], path)
 
 
 def at(value: Any, path: str) -> Any:

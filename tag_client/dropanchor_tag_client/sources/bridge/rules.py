@@ -13,10 +13,11 @@ from dropanchor_tag_client.sources.bridge.places import shown, unknown_place
 from dropanchor_tag_client.sources.bridge.rule import Rule
 from dropanchor_tag_client.sources.bridge.topics import is_filter
 from dropanchor_tag_client.sources.bridge.values import NS_PER, UNITS, Reader
+from dropanchor_tag_client.sources.modules.device_clock import DeviceClock
 from dropanchor_tag_client.sources.publish import fields_of
 
 _NEEDED = ("topic", "tag", "kind", "fields")
-_OPTIONAL = ("each", "time_unit", "time_zone", "decimal_comma", "unit", "scale", "retained")
+_OPTIONAL = ("each", "time_unit", "time_zone", "decimal_comma", "unit", "scale", "retained", "clock")
 
 
 class TemplateError(ValueError):
@@ -31,10 +32,11 @@ def rules_of(path: Path) -> list[Rule]:
         raise TemplateError(f"{path}: {error}") from error
     if not isinstance(tables, list) or not tables:
         raise TemplateError(f"{path} has no table [[rule]]")
-    return [_rule(table, f"{path}: rule {number}") for number, table in enumerate(tables, start=1)]
+    clocks: dict[str, DeviceClock] = {}
+    return [_rule(table, f"{path}: rule {number}", clocks) for number, table in enumerate(tables, start=1)]
 
 
-def _rule(table: Any, where: str) -> Rule:
+def _rule(table: Any, where: str, clocks: dict[str, DeviceClock]) -> Rule:
     try:
         _check_keys(table)
         _check_texts(table)
@@ -47,6 +49,7 @@ def _rule(table: Any, where: str) -> Rule:
             _factors(table),
             _reader(table),
             _flag(table, "retained"),
+            clocks if _counts_from_boot(table) else None,
         )
     except ValueError as error:
         raise TemplateError(f"{where}: {error}") from None
@@ -136,6 +139,15 @@ def _zone(name: Any) -> tzinfo:
         return UTC if name == "UTC" else ZoneInfo(name)
     except (KeyError, ValueError, TypeError, AttributeError, OSError):
         raise ValueError(f"time_zone is {shown(name)}; a name such as UTC or Europe/Berlin was expected") from None
+
+
+def _counts_from_boot(table: dict[str, Any]) -> bool:
+    clock = table.get("clock", "utc")
+    if clock not in ("utc", "boot"):
+        raise ValueError(f"clock is {shown(clock)}; utc or boot was expected")
+    if clock == "boot" and ("t_ns" not in table["fields"] or "time_zone" in table):
+        raise ValueError('clock = "boot" needs t_ns in fields, a number, and no time_zone')
+    return bool(clock == "boot")
 
 
 def _flag(table: dict[str, Any], name: str) -> bool:

@@ -4,8 +4,10 @@
 topic = "plant/+/uwb"            # a filter; {1} below is what the first + stands for
 tag = "cart-{1}"                 # or "{device.id}": from the payload
 kind = "range"                   # range, imu, heading, bearing or pressure
-each = "anchors"                 # optional: a list or an object in the payload, or several lists of the same length.
+each = "anchors"                 # optional: a list or an object in the payload, or several lists of the same length;
+                                 # "[]": the payload is the list; "tags[].ranges": the list in each element of another.
                                  # Paths begin at each of its elements; the time and the tag may stand beside it
+clock = "boot"                   # optional: t_ns counts from the start of the device
 time_unit = "ms"                 # of t_ns: ns, us, ms or s; without t_ns the time of arrival is used
 [rule.fields]
 anchor = "id"                    # a path: names and list indices with dots; "{2}" is what the second + stands for,

@@ -21,6 +21,7 @@ BATTERY, BAROMETER = "battery", "barometer"
 PA_PER_MBAR = 100.0
 MAX_SESSION_ID = 128
 MAX_MESSAGE_ID = 2**53
+_FIELDS = {"messageId", "sessionId", "deviceId", "payload"}
 _NOT_NUMBERS, _TOO_LARGE = "are not numbers", "are larger than a sensor can measure"
 
 
@@ -54,6 +55,9 @@ def parse(body: bytes) -> Message | None:
     payload = message.get("payload", [])
     if not isinstance(payload, list):
         raise PhoneError("The field payload is not a list of readings.")
+    if message and not _FIELDS & message.keys():
+        names = ", ".join(map(str, list(message)[:4]))
+        raise PhoneError(f"The message has fields such as {names}, which are not those of the app Sensor Logger.")
     if not payload:
         return None
     device_id = message.get("deviceId")

@@ -1,7 +1,9 @@
 """Samples over HTTP: who may send them for which tag, what is answered, what is passed on."""
 
+import gzip
 import json
 import math
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +95,39 @@ def test_what_cannot_be_decoded_is_answered_by_its_name_and_passed_on_to_be_coun
     assert (response.status_code, kind_of(response)) == (422, "samples-rejected")
     assert response.json()["reason"] == reason
     assert bench.received == [("a", payload, encoding)]
+
+
+@pytest.mark.parametrize("packing", ["gzip", "deflate"])
+def test_a_packed_body_is_unpacked(packing: str) -> None:
+    bench, payload = make_api_bench(), encode_json(FRAME)
+    packed = gzip.compress(payload) if packing == "gzip" else zlib.compress(payload)
+    answer = post_packed(bench, packed, packing)
+    assert (answer.status_code, answer.json()) == (202, {"samples": 2})
+    assert bench.received == [("a", payload, ENCODING_JSON)]
+
+
+@pytest.mark.parametrize(
+    ("packing", "content", "status", "sentence"),
+    [
+        ("br", b"x", 415, "The Content-Encoding br is not read: gzip, deflate or none is."),
+        ("gzip", b"{}", 422, "The body is not whole gzip, which Content-Encoding says it is."),
+        ("gzip", gzip.compress(bytes(10))[:-9], 422, "The body is not whole gzip"),
+        ("gzip", gzip.compress(bytes(50 * MAX_BODY_BYTES)), 413, "A request body may have at most"),
+    ],
+)
+def test_a_packed_body_that_cannot_be_read_is_told_why(
+    packing: str, content: bytes, status: int, sentence: str
+) -> None:
+    bench = make_api_bench()
+    answer = post_packed(bench, content, packing)
+    assert answer.status_code == status
+    assert sentence in answer.json()["detail"]
+    assert not bench.received
+
+
+def post_packed(bench: ApiBench, content: bytes, packing: str) -> httpx.Response:
+    headers = {"content-type": ENCODING_JSON, "content-encoding": packing}
+    return ask(bench.app(), "POST", f"{SAMPLES}?tag=a", content=content, headers=headers)
 
 
 @pytest.mark.parametrize("path", [SAMPLES, PHONE])

@@ -137,6 +137,8 @@ def test_what_a_template_cannot_find_is_named(template: Template, topic: str, va
         (RULES.replace('time_unit = "ms"', 'time_zone = "Mars"'), "a name such as UTC or Europe/Berlin"),
         (RULES.replace('time_unit = "ms"', 'retained = "yes"'), "true or false was expected"),
         ("rule = [1]", "a table was expected"),
+        (RULES.replace('time_unit = "ms"', 'clock = "gps"'), "utc or boot was expected"),
+        (RULES.replace('tag = "cart"', 'tag = "cart"\nclock = "boot"'), 'clock = "boot" needs t_ns in fields'),
         (RULES.replace('"ms"', '"h"'), "time_unit is one of"),
         (RULES.replace("each", "every"), "there is no key 'every'"),
         (RULES + "]", "rules.toml"),
@@ -190,6 +192,77 @@ def test_each_reads_objects_and_parallel_lists(tmp_path: Path, each: str, source
     one = rule(tmp_path, f'topic = "uwb"\ntag = "cart"\neach = {each}\nfields = {{anchor = {sources}}}')
     found = [(one["anchor"], one["range_m"]) for one in fields(parsed(one, "uwb", payload))]
     assert found[-2:] == [("a1", 3.2), ("a2", 4.1)]
+
+
+POZYX = [
+    {
+        "tagId": "t7",
+        "timestamp": 1.5,
+        "data": {"anchorData": [{"anchorId": "A", "mm": 3120}, {"anchorId": 2, "mm": 40}]},
+    }
+]
+
+
+@pytest.mark.parametrize(
+    ("text", "payload", "expected"),
+    [
+        (
+            'tag = "{tagId}"\neach = "[].data.anchorData"\ntime_unit = "s"\nunit = {range_m = "mm"}\n'
+            'fields = {anchor = "anchorId", range_m = "mm", t_ns = "timestamp"}',
+            POZYX,
+            [("t7", "A", 3.12, 1_500 * MS), ("t7", 2, 0.04, 1_500 * MS)],
+        ),
+        (
+            'tag = "{tag}"\neach = "[]"\nfields = {anchor = "a", range_m = "d"}',
+            [{"tag": "x", "a": "A", "d": 3.0}, {"tag": "y", "a": "A", "d": 4.0}],
+            [("x", "A", 3.0, NOW_NS), ("y", "A", 4.0, NOW_NS)],
+        ),
+        (
+            'tag = "{key}"\neach = "tags[][]"\nfields = {anchor = "a", range_m = "d"}',
+            {"tags": {"cart": [{"a": "A", "d": 3.0}, {"a": "B", "d": 4.0}]}},
+            [("cart", "A", 3.0, NOW_NS), ("cart", "B", 4.0, NOW_NS)],
+        ),
+        (
+            'tag = "{id}"\neach = "tags[].ranges"\nfields = {anchor = "{key}", range_m = "{value}"}',
+            {"tags": [{"id": 7, "ranges": {"A": 3.0}}, {"id": 8, "ranges": {"A": 4.0}}]},
+            [("7", "A", 3.0, NOW_NS), ("8", "A", 4.0, NOW_NS)],
+        ),
+    ],
+    ids=["list_of_tags_with_lists", "list", "object_of_lists", "list_of_objects"],
+)
+def test_each_reads_lists_in_lists(tmp_path: Path, text: str, payload: object, expected: object) -> None:
+    found = parsed(rule(tmp_path, f'topic = "u"\n{text}'), "u", payload)
+    assert [
+        (one.tag, one.fields["anchor"], round(one.fields["range_m"], 6), one.fields["t_ns"])
+        for one in found
+        if isinstance(one, Measurement)
+    ] == expected
+    assert not reasons(found)
+
+
+def test_a_place_in_a_list_is_no_name_of_a_tag(tmp_path: Path) -> None:
+    one = rule(tmp_path, 'topic = "u"\ntag = "{key}"\neach = "tags"\nfields = {anchor = "a", range_m = "d"}')
+    assert parsed(one, "u", {"tags": [{"a": "A", "d": 3.0}]}) == [
+        Dropped(Drop.NOT_UNDERSTOOD, "u: {key} is 0, a place in a list, which is no name of a tag")
+    ]
+
+
+def test_times_since_the_start_of_a_device_become_utc(tmp_path: Path) -> None:
+    text = 'topic = "u/+"\ntag = "{1}"\neach = "[]"\nclock = "boot"\ntime_unit = "us"\n'
+    one = rule(tmp_path, f'{text}fields = {{anchor = "a", range_m = "d", t_ns = "ts"}}')
+
+    def times(topic: str, arrival_ns: int, *micros: int) -> list[int]:
+        value = json.dumps([{"a": "A", "d": 3.0, "ts": ts} for ts in micros]).encode()
+        found = list(one.parse(Received(topic, value, arrival_ns)))
+        return [(one["t_ns"] - NOW_NS) // 1000 for one in fields(found)]
+
+    assert times("u/a", NOW_NS, 51_000_000, 51_100_000) == [-100_000, 0]
+    assert times("u/b", NOW_NS, 7) == [0]
+    late_ns = 80_000_000
+    assert times("u/a", NOW_NS + 200_000_000 + late_ns, 51_200_000, 51_300_000) == pytest.approx(
+        [100_000, 200_000], abs=100
+    )
+    assert times("u/a", NOW_NS + 60_000_000_000, 5, 100_005) == [59_900_000, 60_000_000]  # it began anew
 
 
 def test_parallel_lists_of_different_lengths_are_named(tmp_path: Path) -> None:

@@ -36,6 +36,8 @@ export default {
   "say.no_method": "Hier ist {method} nicht erlaubt, nur {allowed}.",
   "say.no_json": "Der Inhalt lässt sich nicht als JSON lesen.",
   "say.body_too_large": "Der Inhalt einer Anfrage darf höchstens {bytes} Bytes haben.",
+  "say.content_encoding": "Der Inhalt ist mit {packing} gepackt (Content-Encoding): gelesen wird gzip, deflate oder nichts davon.",
+  "say.not_packed": "Der Inhalt ist nicht vollständig mit {packing} gepackt, wie Content-Encoding es sagt.",
   "say.query_unknown": "query.{name}: ist unbekannt; hier gibt es keine Parameter",
   "say.path_escapes": "Die Kennung im Pfad ist kein prozentkodiertes UTF-8.",
   "say.path_id": "Die Kennung im Pfad ist nicht gültig: {why}.",

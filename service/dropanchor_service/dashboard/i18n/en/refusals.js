@@ -36,6 +36,8 @@ export default {
   "say.no_method": "This resource does not allow {method}. It allows {allowed}.",
   "say.no_json": "The body cannot be read as JSON.",
   "say.body_too_large": "A request body may have at most {bytes} bytes.",
+  "say.content_encoding": "The Content-Encoding {packing} is not read: gzip, deflate or none is.",
+  "say.not_packed": "The body is not whole {packing}, which Content-Encoding says it is.",
   "say.query_unknown": "query.{name}: is unknown; this resource takes no query parameters",
   "say.path_escapes": "The id in the path is not percent-escaped UTF-8.",
   "say.path_id": "The id in the path is not valid: {why}.",
