@@ -105,7 +105,10 @@ class _Rule(Concerned):
 
 
 class TooCloseRule(_Rule):
-    """Two of the tags are closer than `distance_m`. One event per approach, about the tag whose id comes first."""
+    """Two of the tags are closer than `distance_m`. One event per approach, about the tag whose id comes first.
+
+    Heights count where both are known, and tags that are surely on two floors of the plans are not close.
+    """
 
     type: Literal["too_close"]
     distance_m: Annotated[FiniteFloat, Field(ge=0.1, le=1000), NumberOnly]

@@ -50,10 +50,10 @@ from dropanchor_service.ingest.screening import screen
 from dropanchor_service.runtime.kernel_cache import VARIABLE, is_kept
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.arrivals import Arrivals
-from dropanchor_service.store.floors import floors_of
+from dropanchor_service.store.floors import NO_FLOORS, floors_of
 from dropanchor_service.store.groups import Groups
 from dropanchor_service.zones.modes import placed
-from dropanchor_service.zones.pair_watch import PairWatch
+from dropanchor_service.zones.pair_watch import PairWatch, places_of
 from dropanchor_service.zones.zone_watch import ZoneWatch
 
 ESTIMATOR = say("the_estimator", "the estimator, which takes half a minute or more")
@@ -295,6 +295,6 @@ def warm_up_zones(progress: CompilationProgress | None = None) -> None:
         zones.add_tags(names)
         list(zones.judge(found))
         rule = TooCloseRule(id="a", type="too_close", distance_m=9.0, delay_s=0.0)
-        pairs = PairWatch(rule, Groups())
+        pairs, places = PairWatch(rule, Groups()), places_of(*found.single(), NO_FLOORS)
         for _ in range(2):
-            list(pairs.judge(*found.single(), names.__getitem__, 1))
+            list(pairs.judge(poses["row"], places, names.__getitem__, 1))

@@ -16,7 +16,7 @@ from dropanchor_service.store import HealthTable, SiteStore, TagTable
 from dropanchor_service.store.starts import StartNews, StartPhase
 from dropanchor_service.zones.items import ZoneItems
 from dropanchor_service.zones.judge import INSIDE
-from dropanchor_service.zones.pair_watch import PairWatch
+from dropanchor_service.zones.pair_watch import PairWatch, places_of
 from dropanchor_service.zones.tag_watch import FleetState, TagWatch
 from dropanchor_service.zones.zone_watch import ZoneChange, ZoneWatch
 
@@ -153,10 +153,11 @@ class SiteWatch:
             if not self.has_start(tag):
                 self._starts.begin(tag, news, self._zones_of(tag))
 
-    def judge_pairs(self, rows: Array, modes: Array, now_ns: int) -> None:
-        """Judge the rules for pairs. modes: MODE of each row of this site that has one place."""
+    def judge_pairs(self, poses: Array, modes: Array, now_ns: int) -> None:
+        """Judge the rules for pairs. poses, modes: POSE and MODE of each tag of this site that has one place."""
+        places = places_of(poses, modes, self._site.store.floors)
         for watch in self._pairs.values():
-            for change in watch.judge(rows, modes, self._name_of, now_ns):
+            for change in watch.judge(poses["row"], places, self._name_of, now_ns):
                 key = StateKey("rule", watch.rule.id, *map(self._name_of, change.rows))
                 self._set(key, StateValue(1, change.since_ns) if change.is_close else None)
                 if change.is_close:

@@ -164,13 +164,13 @@ class Watcher:
 
     def _judge_pairs(self, now_ns: int, waiting: set[int]) -> None:
         poses = self._confirmed(self._known(self._latest.since()[1], waiting))
-        rows, modes = placed(poses, self._rows.overdue_s(poses, now_ns), self._latest).single()
-        of_site = self._rows.sites(rows)
+        poses, modes = placed(poses, self._rows.overdue_s(poses, now_ns), self._latest).single()
+        of_site = self._rows.sites(poses["row"])
         order = np.argsort(of_site, kind="stable")
-        rows, modes, of_site = rows[order], modes[order], of_site[order]
+        poses, modes, of_site = poses[order], modes[order], of_site[order]
         for index in self._with_pairs.keys() - waiting:
             begin, end = np.searchsorted(of_site, (index, index + 1))
-            self._with_pairs[index].judge_pairs(rows[begin:end], modes[begin:end], now_ns)
+            self._with_pairs[index].judge_pairs(poses[begin:end], modes[begin:end], now_ns)
         self.is_full = any(site.is_full for site in self._with_pairs.values())
 
     def _judge_tags(self, now_ns: int, waiting: set[int]) -> None:

@@ -22,9 +22,9 @@ class PlacedPoses:
     first: Array
 
     def single(self) -> tuple[Array, Array]:
-        """Return the rows of the tags that have one place, and its MODE."""
+        """Return the POSE of the tags that have one place, and its MODE."""
         single = self.poses["state"] != State.AMBIGUOUS
-        return self.poses["row"][single], self.modes[self.first[:-1][single]]
+        return self.poses[single], self.modes[self.first[:-1][single]]
 
 
 def placed(poses: Array, age_s: Array, latest: LatestPoses) -> PlacedPoses:

@@ -1,13 +1,16 @@
 """Tags make events by probability, after a delay, and never because something is unknown."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
+from dropanchor_schemas.plans import Floor
 from dropanchor_schemas.site import TagSettings
 from dropanchor_schemas.zones import AmbiguousRule, BatteryLowRule, LostRule, TooCloseRule
 from dropanchor_service.estimation.columns import Frame, HeightSource, State, StateReason
+from dropanchor_service.store.floors import floors_of
 from support.events import EventBench, S, circle
 
 
@@ -178,6 +181,52 @@ def test_two_tags_that_come_too_close_make_one_event_per_approach() -> None:
     stay(2.0)
     places["b"] = 2.0
     assert stay(3.0) == ["tags.too_close a"]
+
+
+LEVEL = {"z": 0.0, "z_std": 0.2, "z_source": HeightSource.PRESSURE}
+
+
+@pytest.mark.parametrize(
+    ("above", "is_close"),
+    [
+        (LEVEL | {"z": 2.0}, True),
+        (LEVEL | {"z": 2.85}, False),  # 3.02 m apart; flat it would be 1 m
+        (LEVEL | {"z": 28.8}, False),
+        (LEVEL | {"z": 2.0, "z_std": 1.5}, False),
+        (LEVEL | {"z": 28.8, "z_source": HeightSource.START}, True),  # a height that is not in the frame of the site
+        (LEVEL | {"z": math.nan}, True),
+    ],
+)
+def test_heights_that_are_known_keep_tags_apart(above: dict[str, Any], is_close: bool) -> None:
+    bench = EventBench()
+    bench.put(rules=[TooCloseRule(id="apart", type="too_close", distance_m=3.0)])
+    found = []
+    for _ in range(15):
+        bench.poses.move("a", x=0.0, **LEVEL)
+        bench.poses.move("b", x=1.0, **above)
+        found += bench.stay(0.2)
+    assert found == (["tags.too_close a"] if is_close else [])
+
+
+def test_tags_on_two_floors_are_not_close_and_a_pair_parts_when_one_takes_the_lift() -> None:
+    bench = EventBench()
+    bench.poses.answers.site.floors = floors_of(
+        [Floor(name="0", bottom_m=-1, top_m=3), Floor(name="1", bottom_m=3, top_m=7)]
+    )
+    bench.put(rules=[TooCloseRule(id="apart", type="too_close", distance_m=12.0)])
+
+    def stay(z: float) -> list[str]:
+        found = []
+        for _ in range(15):
+            bench.poses.move("a", x=0.0, **LEVEL | {"z": 1.0})
+            bench.poses.move("b", x=1.0, **LEVEL | {"z": z})
+            found += bench.stay(0.2)
+        return found
+
+    assert stay(4.5) == []
+    assert stay(1.0) == ["tags.too_close a"]
+    assert stay(4.5) == []
+    assert stay(1.0) == ["tags.too_close a"]  # they were apart meanwhile
 
 
 def test_a_low_battery_a_lost_and_an_ambiguous_tag_make_one_event_each() -> None:

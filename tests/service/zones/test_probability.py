@@ -6,6 +6,7 @@ import math
 import numpy as np
 import shapely
 
+from dropanchor_service.zones.pair_watch import PLACE, p_close
 from dropanchor_service.zones.probability import p_inside
 from dropanchor_service.zones.shapes import disc
 
@@ -62,3 +63,19 @@ def test_a_tag_without_a_spread_is_inside_or_outside() -> None:
     corners = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
     assert p_inside(2.0, 2.0, np.zeros((2, 2)), corners, 0, 4) > 0.999
     assert p_inside(4.1, 2.0, np.zeros((2, 2)), corners, 0, 4) < 0.001
+
+
+def test_the_distance_of_two_tags_with_heights_agrees_with_a_dense_monte_carlo() -> None:
+    rng = np.random.default_rng(4)
+    standard = rng.standard_normal((SAMPLES, 3))
+    worst = 0.0
+    for _ in range(60):
+        pair = np.zeros(2, PLACE)
+        root, std = rng.normal(0, 0.5, (2, 2)), rng.uniform(0.05, 1.0)
+        pair["x"][1], pair["y"][1], pair["z"][1] = mean = rng.uniform(-4, 4, 3)
+        pair["cov"][1], pair["z_std"][1], pair["weight"], pair["floor"] = root @ root.T, std, 1.0, -1
+        apart = mean + np.column_stack([standard[:, :2] @ root.T, std * standard[:, 2]])
+        counted = (np.linalg.norm(apart, axis=1) < 4.0).mean()
+        worst = max(worst, abs(p_close(pair[0], pair[1], 4.0, disc(4.0)) - counted))
+    _log.info("Pairs with heights: worst difference from %s samples %.2g.", SAMPLES, worst)
+    assert worst < 0.02
