@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from dropanchor_schemas import decode_json, keys
+from dropanchor_schemas.pose import Pose, PoseFrame
 from dropanchor_schemas.wire import (
     BearingSample,
     Frame,
@@ -112,6 +113,17 @@ def test_the_c_program_writes_a_payload_that_decodes(tmp_path: Path) -> None:
 def test_the_javascript_writes_a_payload_that_decodes() -> None:
     (program,) = blocks("js")
     one_range(subprocess.run(["node", "-e", program], check=True, capture_output=True).stdout)
+
+
+def test_the_poses_in_the_examples_are_those_of_the_contract() -> None:
+    section = README.split("\n## Poses\n")[1].split("\n## ")[0]
+    pose, error, frame = (
+        json.loads(text) for text in re.findall(r"^```json\n(.*?)^```$", section, re.DOTALL | re.MULTILINE)
+    )
+    assert Pose.model_validate(pose).tag == "tag-1"
+    assert list(error) == ["error"]
+    assert len(PoseFrame.model_validate(frame).tags) == 2
+    assert {len(column) for column in frame.values() if isinstance(column, list)} == {2}
 
 
 def test_every_json_block_is_json() -> None:

@@ -59,6 +59,12 @@ MOUNT_UNKNOWN = say(
     "mount_unknown",
     "The mounting angle is not known yet: turn left and right once, or set it (`mount_angle_rad`).",
 )
+FORWARD_UNKNOWN = say(
+    "forward_unknown",
+    "Forwards cannot be told from backwards yet: brake and drive on, turn left and right, or say how the IMU is "
+    "mounted (`mount_angle_rad`).",
+)
+FORWARD_RANGES, FORWARD_IMU = 300, 3_000  # after so many samples, walking on has not told it
 HEIGHT_UNTOLD = say(
     "height_untold",
     "No floor is named, because the height at which this tag started is not known: set it (`height_m`; if it is 0, "
@@ -245,14 +251,18 @@ def _lags(poses: Array, tags: TagTable, hint: Array) -> Iterator[tuple[str, Arra
 
 def _mounts(poses: Array, site: SiteStore, tags: TagTable) -> list[tuple[str, Array]]:
     """Return the hint for vehicles with an IMU alone, whose mounting angle the engine still has to learn."""
-    places = np.flatnonzero(poses["reason"] == StateReason.UNCERTAIN)
+    places = np.flatnonzero(np.isin(poses["reason"], (StateReason.UNCERTAIN, StateReason.SEVERAL_MODES)))
     if not len(places):
         return []
     samples = tags.counts(poses["row"][places])["samples"]
-    places = places[(samples[:, _IMU] > 0) & (samples[:, _HEADING] == 0)]
+    several = poses["reason"][places] == StateReason.SEVERAL_MODES
+    long = (samples[:, _RANGE] >= FORWARD_RANGES) & (samples[:, _IMU] >= FORWARD_IMU)
+    alone = (samples[:, _IMU] > 0) & (samples[:, _HEADING] == 0) & (long | ~several)
+    places, several = places[alone], several[alone]
     settings = map(site.tag_settings, tags.names(poses["row"][places].tolist()))
-    unknown = [tag.mount_angle_rad is None and tag.motion != "carried" for tag in settings]
-    return [(MOUNT_UNKNOWN, places[unknown])] if any(unknown) else []
+    unknown = np.array([tag.mount_angle_rad is None and tag.motion != "carried" for tag in settings], bool)
+    hints = ((MOUNT_UNKNOWN, places[unknown & ~several]), (FORWARD_UNKNOWN, places[unknown & several]))
+    return [(text, where) for text, where in hints if len(where)]
 
 
 def _unknown_anchors(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> list[tuple[str, Array]]:

@@ -157,6 +157,15 @@ def test_the_mounting_angle_is_named_only_where_it_is_unknown() -> None:
         assert cart.hint(StateReason.UNCERTAIN) == HINTS[StateReason.UNCERTAIN]
 
 
+def test_a_tag_that_may_go_backwards_for_long_is_told_what_shows_its_front() -> None:
+    cart = Listener()
+    for i in range(300):
+        cart.send(0.1 * i + 0.1, [0.1 * i + 0.01 * k for k in range(10)])
+    assert cart.hint(StateReason.SEVERAL_MODES).startswith("Forwards cannot be told from backwards yet: brake")
+    cart.bench.site.set_tag("cart", TagSettings(mount_angle_rad=0.0))
+    assert cart.hint(StateReason.SEVERAL_MODES) == HINTS[StateReason.SEVERAL_MODES]
+
+
 def test_a_tag_with_a_heading_of_its_platform_has_no_mounting_angle_to_learn() -> None:
     cart = Listener()
     cart.send(0.1, [0.0])

@@ -47,7 +47,13 @@ from support.sentences import PREFIX, about_sensors, calls, in_words, messages, 
 def hints_of_poses() -> Iterator[str]:
     yield from filter(None, hints.HINTS)
     yield hints.RELATIVE_HINT
-    yield from (hints.MOUNT_UNKNOWN, hints.RANGES_COME, hints.MOTION_COMES, hints.needs_both(5, 120))
+    yield from (
+        hints.MOUNT_UNKNOWN,
+        hints.FORWARD_UNKNOWN,
+        hints.RANGES_COME,
+        hints.MOTION_COMES,
+        hints.needs_both(5, 120),
+    )
     for say_so in (hints.late, hints.in_bursts, hints.few_ranges, hints.all_zero, hints.lags):
         yield say_so(8)
     for what, reasons in unused.WHY.items():

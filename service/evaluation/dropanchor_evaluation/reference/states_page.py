@@ -5,6 +5,9 @@ from dropanchor_schemas.pose import StateReason, TrackingState
 from dropanchor_schemas.rejections import Reason
 from dropanchor_service.answers.columns import REASONS
 from dropanchor_service.answers.hints import (
+    FORWARD_IMU,
+    FORWARD_RANGES,
+    FORWARD_UNKNOWN,
     HINTS,
     MOTION_COMES,
     MOUNT_UNKNOWN,
@@ -76,6 +79,10 @@ _CAUSES = (
     ("more than 1.5 s between two ranges, on average over 6 s", few_ranges(2)),
     ("ranges to anchors that the site does not have, and to no other", hint_about("9", hears_others=False)),
     ("ranges to such an anchor and to others", hint_about("9", hears_others=True)),
+    (
+        f"`several_modes` after {FORWARD_RANGES} ranges and {FORWARD_IMU} IMU samples, and no `mount_angle_rad`",
+        FORWARD_UNKNOWN,
+    ),
     ("`uncertain`, an IMU alone, and no `mount_angle_rad` in the settings", MOUNT_UNKNOWN),
     ("`resolved` in the state `relative`", RELATIVE_HINT),
     ("times that look like seconds, milliseconds or microseconds", hint_about_time(1_800_000_000_000)),

@@ -92,6 +92,7 @@ export default {
   "say.late": "Messwerte kommen {seconds} s zu spät an: Prüfen Sie die Uhr des Tags und sein Netz.",
   "say.in_bursts": "Messwerte kommen in Schüben von {seconds} s: Lassen Sie das Tag kleinere Pakete senden, und prüfen Sie sein Netz.",
   "say.few_ranges": "Eine Distanz in {seconds} s ist zu wenig: Erhöhen Sie die Rate des Funkmoduls, oder bringen Sie das Tag näher an den Anker.",
+  "say.forward_unknown": "Noch ist nicht zu erkennen, was vorwärts und was rückwärts ist: Bremsen Sie und fahren Sie wieder an, biegen Sie links und rechts ab, oder sagen Sie, wie die IMU eingebaut ist (`mount_angle_rad`).",
   "say.mount_unknown": "Der Einbauwinkel ist noch nicht bekannt: Biegen Sie einmal links und rechts ab, oder legen Sie ihn fest (`mount_angle_rad`).",
   "say.uncertainty": "± {half} m, davon {part} m durch {cause}. {cure}",
   "say.uncertain.north": "die Lage von Nord",

@@ -92,6 +92,7 @@ export default {
   "say.late": "Samples arrive {seconds} s late: check the clock of the tag, and its network.",
   "say.in_bursts": "Samples come in bursts of {seconds} s: let the tag send smaller batches, and check its network.",
   "say.few_ranges": "One range in {seconds} s is too few: raise the rate of the radio, or bring the tag nearer to the anchor.",
+  "say.forward_unknown": "Forwards cannot be told from backwards yet: brake and drive on, turn left and right, or say how the IMU is mounted (`mount_angle_rad`).",
   "say.mount_unknown": "The mounting angle is not known yet: turn left and right once, or set it (`mount_angle_rad`).",
   "say.uncertainty": "± {half} m, of which {part} m come from {cause}. {cure}",
   "say.uncertain.north": "where north is",
