@@ -14,12 +14,12 @@ JSON = "application/json"
 _WEIGHT = re.compile(r"0(\.[0-9]{0,3})?|1(\.0{0,3})?")
 
 
-def is_preferred(request: Request, answers: Answers) -> bool:
-    """Return whether the client prefers GeoJSON to JSON.
+def is_preferred(request: Request, answers: Answers, told: str | None) -> bool:
+    """Return whether the client prefers GeoJSON to JSON. told: `json` or `geojson` where the address says it.
 
     Raises ProblemError when it accepts neither, or prefers GeoJSON and the site has no georeference.
     """
-    accept = request.headers.get("accept", "*/*")
+    accept = {None: request.headers.get("accept", "*/*"), "json": JSON, "geojson": MEDIA_TYPE}[told]
     if accept in ("*/*", JSON):
         return False
     as_json, as_geojson = quality(accept, JSON), quality(accept, MEDIA_TYPE)

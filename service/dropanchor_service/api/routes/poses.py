@@ -2,12 +2,12 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 from starlette.responses import Response, StreamingResponse
 
 from dropanchor_schemas.explain import Explanation
@@ -38,6 +38,24 @@ PIECE_BYTES = 400_000  # larger writes are copied repeatedly while the kernel do
 _NEGOTIATION = (Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED, Kind.INVALID_REQUEST)
 
 
+_Format = Annotated[
+    Literal["json", "geojson"] | None,
+    Field(description="The format of the response. The default depends on the header `Accept`."),
+]
+
+
+class ListedPoses(PoseQuery):
+    """The query of the list of poses."""
+
+    format: _Format = None
+
+
+class PoseOfTag(AtTime):
+    """The query of one pose."""
+
+    format: _Format = None
+
+
 def poses_router() -> APIRouter:
     router = APIRouter(tags=["poses"])
     _add_pose_route(router)
@@ -47,9 +65,9 @@ def poses_router() -> APIRouter:
 
 
 def _add_pose_route(router: APIRouter) -> None:
-    async def get_pose(tag: TagId, query: Annotated[AtTime, Query()], request: Request) -> Response:
+    async def get_pose(tag: TagId, query: Annotated[PoseOfTag, Query()], request: Request) -> Response:
         answers = answers_of(request)
-        as_geojson = geojson.is_preferred(request, answers)
+        as_geojson = geojson.is_preferred(request, answers, query.format)
         if query.at is None:
             pose = _pose_of(answers, tag)
         else:  # may read from disk
@@ -95,9 +113,9 @@ def _add_list_route(router: APIRouter) -> None:
         response_model=PoseList,
         responses=_offers(examples.POSE_LIST, PoseFeatureCollection) | problems(*_NEGOTIATION),
     )
-    async def list_poses(query: Annotated[PoseQuery, Query()], request: Request) -> Response:
+    async def list_poses(query: Annotated[ListedPoses, Query()], request: Request) -> Response:
         answers = answers_of(request)
-        as_geojson = geojson.is_preferred(request, answers)
+        as_geojson = geojson.is_preferred(request, answers, query.format)
         found = [tag for tag in map(answers.tags.find, query.tags) if tag is not None]
         tags = found if query.tags else None
         if as_geojson:
@@ -116,7 +134,7 @@ class PlainPose(APIRoute):
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         with_parameters = super().get_route_handler()
-        no_query = AtTime()
+        no_query = PoseOfTag()
 
         async def handle(request: Request) -> Response:
             if request.scope["query_string"]:

@@ -85,6 +85,19 @@ def test_one_pose_is_a_feature() -> None:
     assert (feature["type"], feature["geometry"]["coordinates"]) == ("Feature", pytest.approx([13.4, 52.5]))
 
 
+@pytest.mark.parametrize("path", ["/api/v1/poses", "/api/v1/tags/a/pose"])
+def test_the_address_may_name_the_form_instead_of_the_header(path: str) -> None:
+    bench = make_api_bench(GEOREFERENCED)
+    bench.move("a")
+    header = {"accept": "application/geo+json"}
+    named = ask(bench.app(), "GET", f"{path}?format=geojson")
+    assert named.headers["content-type"] == "application/geo+json"
+    assert named.json()["type"] == ask(bench.app(), "GET", path, headers=header).json()["type"]
+    assert ask(bench.app(), "GET", f"{path}?format=json", headers=header).headers["content-type"] == "application/json"
+    assert kind_of(ask(bench.app(), "GET", f"{path}?format=shp")) == "invalid-request"
+    assert kind_of(ask(make_api_bench().app(), "GET", "/api/v1/poses?format=geojson")) == "not-georeferenced"
+
+
 def test_geojson_without_a_georeference_says_what_to_do() -> None:
     response = ask(make_api_bench().app(), "GET", "/api/v1/poses", headers={"accept": "application/geo+json"})
     assert kind_of(response) == "not-georeferenced"
