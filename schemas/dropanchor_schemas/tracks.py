@@ -45,6 +45,10 @@ class TrackPoints(_Answer):
         description="The worst of all stored poses since the previous point. `doubtful`: some were coasting or "
         "degraded. `unknown`: some were at no place of the map, or there was none for over 10 s; draw no line then."
     )
+    off_m: list[float | None] = Field(
+        description="How far the stored poses since the previous point are from the straight line, at most, m. Null: "
+        "not known, so a line is only a sketch."
+    )
 
 
 class TagSummary(_Answer):

@@ -26,7 +26,7 @@ def many_tracks(
     Raises HistoryError and TooMuchError.
     """
     found = tracks.overview(tags, from_ns, to_ns, max_points)
-    columns = _columns(found.points["point"], found.points["since_previous"], floors)
+    columns = _columns(found.points, floors)
     begins = np.searchsorted(found.points["tag"], found.figures["tag"])
     ends = np.searchsorted(found.points["tag"], found.figures["tag"], side="right")
     each = [
@@ -52,8 +52,9 @@ def figures_of(summary: Array) -> dict[str, Any]:
     }
 
 
-def _columns(points: Array, since_previous: Array, floors: Floors) -> dict[str, Any]:
+def _columns(found: Array, floors: Floors) -> dict[str, Any]:
     """Return the columns of `TrackPoints`."""
+    points = found["point"]
     own = (points["state"] & RELATIVE) != 0
     frames = np.where(own, Frame.RELATIVE, Frame.SITE)
     covariances = np.empty((len(points), 2, 2))
@@ -73,7 +74,8 @@ def _columns(points: Array, since_previous: Array, floors: Floors) -> dict[str, 
         **{name: np.ascontiguousarray(values, np.float32) for name, values in (in_site | heights).items()},
         "z_source": height_source_values(points),
         **floor_columns(floors, points),
-        "since_previous": [_BETWEEN[between] for between in since_previous.tolist()],
+        "since_previous": [_BETWEEN[between] for between in found["since_previous"].tolist()],
+        "off_m": np.ascontiguousarray(found["off_m"]),
     }
 
 

@@ -10,6 +10,7 @@ from enum import IntEnum
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array, State
+from dropanchor_service.history.shapes import by_shape, off_the_line
 from dropanchor_service.store.records import put, take
 
 GAP_NS = 10_000_000_000  # nothing is known between two poses that are further apart
@@ -40,7 +41,7 @@ SUMMARY = np.dtype(
         ("max_speed", "<f4"),  # m/s, NaN: never tracked
     ]
 )
-TRACK_POINT = np.dtype([("tag", "<u4"), ("point", POINT), ("since_previous", "u1")])
+TRACK_POINT = np.dtype([("tag", "<u4"), ("point", POINT), ("since_previous", "u1"), ("off_m", "<f4")])
 
 
 class Between(IntEnum):
@@ -89,45 +90,60 @@ def summary_per_tag(summaries: Array) -> Array:
 
 
 def points_of(summaries: Array) -> Array:
-    """Return the TRACK_POINT at both ends of each SUMMARY, in the same order."""
+    """Return the TRACK_POINT at both ends of each SUMMARY, in the same order. off_m: NaN within one with more."""
     points = np.zeros((len(summaries), 2), TRACK_POINT)
     points["tag"] = summaries["tag"][:, None]
     for column, end in enumerate(("first", "last")):
         put(points["point"][:, column], slice(None), summaries[end])
     points["since_previous"][:, 0] = _since_previous(summaries)[0] if len(summaries) else Between.UNKNOWN
     points["since_previous"][:, 1] = summaries["between"]
+    points["off_m"][:, 1] = np.where(summaries["poses"] > 2, np.nan, 0.0)
     several = np.column_stack([np.ones(len(summaries), bool), summaries["poses"] > 1])
     return take(points, several)
 
 
 def thinned(points: Array, max_points: int) -> Array:
-    """Return at most `max_points` of each tag: the first, the last, changes of state, and points evenly in time.
+    """Return at most `max_points` of each tag: the first, the last, changes of state, and others.
 
-    points: TRACK_POINT, in order. Changes of state beyond half of the points are left out; `since_previous` of a point
-    always tells the worst since the previous point that is left.
+    points: TRACK_POINT, in order. The others are even in time; where they would be further apart than `GAP_NS`, half of
+    them are those that the shape of the track needs most. Changes of state beyond half of the points are left out.
+    `since_previous` and `off_m` of a point always tell the worst since the previous point that is left.
     """
     if len(points) == 0:
         return points
     begins = _begins(points["tag"])
     changes = _state_changes(points, begins, (max_points - 2) // 2)
     bins = np.maximum(1, max_points - 2 - np.add.reduceat(changes, np.flatnonzero(begins), dtype=np.int64))
-    kept = changes | _first_of_bin(points["point"]["t_ns"], begins, bins) | np.append(begins[1:], True)
+    fixed = changes | begins | np.append(begins[1:], True)
+    first, is_long = _first_of_bin(points["point"]["t_ns"], begins, bins)
+    point = points["point"]
+    kept = fixed | first
+    if is_long.any():
+        even = fixed | _first_of_bin(point["t_ns"], begins, np.maximum(1, bins // 2))[0]
+        kept = np.where(is_long, by_shape(points["tag"], point["x"], point["y"], even, max_points), kept)
     places = np.flatnonzero(kept)
     left = take(points, places)
-    worst = np.maximum.reduceat(np.where(begins, 0, points["since_previous"]), np.append(0, places[:-1] + 1))
+    since = np.append(0, places[:-1] + 1)
+    worst = np.maximum.reduceat(np.where(begins, 0, points["since_previous"]), since)
     left["since_previous"] = np.where(begins[places], Between.UNKNOWN, worst)
+    left["off_m"] = np.maximum.reduceat(
+        np.maximum(points["off_m"], off_the_line(point["x"], point["y"], places)), since
+    )
     return left
 
 
-def _first_of_bin(t_ns: Array, begins: Array, bins: Array) -> Array:
-    """Return whether each point is the first in its bin. bins: into how many the time of each tag is divided."""
+def _first_of_bin(t_ns: Array, begins: Array, bins: Array) -> tuple[Array, Array]:
+    """Return whether each point is the first in its bin, and whether this is longer than `GAP_NS`.
+
+    bins: into how many the time of each tag is divided.
+    """
     starts = np.flatnonzero(begins)
     ends = np.append(starts[1:], len(t_ns)) - 1
     length = -(-(t_ns[ends] - t_ns[starts] + 1) // bins)
     counts = ends - starts + 1
     number = (t_ns - np.repeat(t_ns[starts], counts)) // np.repeat(length, counts)
     first: Array = begins | np.append(True, number[1:] != number[:-1])
-    return first
+    return first, np.repeat(length > GAP_NS, counts)
 
 
 def _state_changes(points: Array, begins: Array, limit: int) -> Array:

@@ -17,7 +17,7 @@ function points(columns = {}, length = 4) {
     t_ns: column((i) => i * 1e9), state: column(() => "tracking"), frame: column(() => "site"), x: column((i) => i),
     y: column(() => 5), z: column((i) => 3 * i), z_std_m: column((i) => 0.1 + i), z_source: column(() => "pressure"), floor: column(() => "0"), floor_probability: column(() => 1), heading_rad: column(() => 0), speed_mps: column(() => 1), sigma_pos_m: column(() => 0.2),
     semi_major_m: column((i) => 1 + i), semi_minor_m: column(() => 1), angle_rad: column(() => 0),
-    since_previous: column((i) => (i === 0 ? "unknown" : "tracking")), ...columns,
+    since_previous: column((i) => (i === 0 ? "unknown" : "tracking")), off_m: column(() => 0), ...columns,
   };
 }
 
@@ -121,9 +121,22 @@ test("the line of a period is dashed where poses were doubtful and broken where 
     setLineDash: (/** @type {number[]} */ pattern) => (dash = pattern.length ? "dashed" : "solid"), beginPath() {}, stroke() {},
     moveTo: (/** @type {number} */ x) => drawn.push([dash, x]), lineTo: (/** @type {number} */ x) => drawn.at(-1).push(x),
   };
-  const view = { screenX: (/** @type {number} */ x) => x, screenY: (/** @type {number} */ y) => y };
+  const view = { screenX: (/** @type {number} */ x) => x, screenY: (/** @type {number} */ y) => y, scale: 20 };
   drawTrack(/** @type {any} */ ({ ctx, view, palette: {} }), track({ since_previous: ["unknown", "tracking", "unknown", "doubtful"] }));
   assert.deepEqual(drawn, [["solid", 0, 1], ["dashed", 2, 3]]);
+});
+
+test("where stored poses are more than a pixel off the line, or nobody knows, it is dotted as a sketch", () => {
+  /** @type {any[]} */
+  const drawn = [];
+  let dash = "";
+  const ctx = {
+    setLineDash: (/** @type {number[]} */ dashes) => (dash = dashes.join(" ")), beginPath() {}, stroke() {},
+    moveTo: (/** @type {number} */ x) => drawn.push([dash, x]), lineTo: (/** @type {number} */ x) => drawn.at(-1).push(x),
+  };
+  const view = { screenX: (/** @type {number} */ x) => x, screenY: (/** @type {number} */ y) => y, scale: 20 };
+  drawTrack(/** @type {any} */ ({ ctx, view, palette: {} }), track({ off_m: [0, 0.04, 0.06, null] }));
+  assert.deepEqual(drawn, [["", 0, 1], ["1 6", 1, 2], ["1 6", 2, 3]]);
 });
 
 test("the clock waits for a missing piece, and the tags stay where they are", async () => {

@@ -137,6 +137,8 @@ def test_the_map_follows_a_tag_through_the_past(chromium: Browser, past: tuple[P
     place, end_ns = past
     with watched_page(chromium, link_to(place, end_ns, 0, speed="20", tag="first"), reduced_motion="reduce") as page:
         wait_for_past(page, 3)
+        asked = "performance.getEntriesByType('resource').some(({ name }) => /max_points=5000&tags=first/.test(name))"
+        page.wait_for(asked)  # for the line of the chosen tag
         page.page.locator("[data-part='follow']").click()
         page.page.locator("[data-part='play']").click()
         page.wait_for("dropanchor.tags()[0]?.x > 60")

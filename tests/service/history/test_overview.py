@@ -1,9 +1,12 @@
 """The overview of many tracks: figures, a few points of each tag, and what is known between them."""
 
 import sqlite3
+from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import pytest
+import shapely
 
 from dropanchor_service.estimation.columns import POSE, Array, Frame, HeightSource, State
 from dropanchor_service.history.errors import TooMuchError, UnfinishedSummaryError
@@ -135,6 +138,50 @@ def test_thinned_points_keep_the_first_the_last_and_changes_of_state(place: Plac
     assert {501, 502} <= set(seconds)
     between = dict(zip(seconds, found["since_previous"].tolist(), strict=True))
     assert (between[501], between[502], between[999]) == (Between.DOUBTFUL, Between.DOUBTFUL, Between.TRACKING)
+
+
+def rounds(hours: int) -> Array:
+    """Return poses of a tag that drives around a block of 200 × 60 m, and rests every tenth minute."""
+    seconds = np.arange(0.0, hours * HOUR)
+    way = np.cumsum(np.where(seconds % 600 < 60, 0.0, 1.5))
+    corners = np.array([0, 200, 200, 0, 0]) + 1j * np.array([0, 0, 60, 60, 0])
+    along = np.interp(way % 520, [0, 200, 260, 460, 520], corners)
+    return drive(seconds, x=along.real, y=along.imag)
+
+
+def farthest(made: Array, line: Array) -> tuple[float, Array]:
+    """Return how far a pose is from the line through these points, at most, and the same of each stretch."""
+    each = [
+        max((float(shapely.LineString([a, b]).distance(shapely.Point(p))) for p in between), default=0.0)
+        for a, b, between in stretches(made, line)
+    ]
+    return max(each), np.array(each)
+
+
+def stretches(made: Array, line: Array) -> Iterator[tuple[list[float], list[float], list[list[float]]]]:
+    xy = np.column_stack([made["x"], made["y"]]).tolist()
+    at = np.searchsorted(made["t_ns"], line["point"]["t_ns"]).tolist()
+    for start, end in pairwise(at):
+        yield xy[start], xy[end], xy[start + 1 : end]
+
+
+def test_the_line_over_a_day_is_that_of_the_poses_or_says_how_far_they_are_from_it(any_place: Place) -> None:
+    made = rounds(24)
+    store(any_place, a=made).close()
+    found = points(overview(any_place, 0, 24 * HOUR, max_points=5000), "a")
+    assert len(found) <= 5000
+    worst, each = farthest(made, found)
+    assert worst < 0.5  # even in time, it is 10 m: the line cuts whole corners
+    assert found["off_m"][1:] == pytest.approx(each, abs=0.01)
+    few = points(overview(any_place, 0, 24 * HOUR, max_points=300), "a")
+    assert few["off_m"][1:] == pytest.approx(farthest(made, few)[1], abs=0.01)
+    assert np.diff(few["point"]["t_ns"]).max() < 900 * SECOND  # heights and states are seen all along
+
+
+def test_how_far_summaries_are_from_their_line_is_not_known(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dropanchor_service.history.overview.MAX_POSES", 0)
+    store(place, a=rounds(1)).close()
+    assert np.isnan(points(overview(place, 0, HOUR), "a")["off_m"]).mean() > 0.5  # the others join two neighbours
 
 
 @pytest.mark.parametrize("max_points", [2, 3, 7, 50])

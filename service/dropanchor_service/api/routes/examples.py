@@ -272,6 +272,7 @@ TRACKS: dict[str, Any] = {
                 "semi_minor_m": [0.2, 0.2],
                 "angle_rad": [0.0, 0.0],
                 "since_previous": ["unknown", "tracking"],
+                "off_m": [0.0, 0.04],
             },
         }
     ],

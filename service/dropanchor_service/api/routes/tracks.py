@@ -17,8 +17,9 @@ from dropanchor_service.history.errors import HistoryError, TooMuchError
 
 _DESCRIPTION = """\
 The distance, the tracked time and the speeds of each tag over a period, and a few of its stored poses: the first, the
-last, those with which the state changes, and others evenly in time. The tags share 200,000 points, so each has fewer
-than `max_points` where there are very many. Poses appear about two seconds after they are computed."""
+last, those with which the state changes, others evenly in time and, over hours, those that the shape of the track
+needs most. The tags share 200,000 points, so each has fewer than `max_points` where there are very many. Poses appear
+about two seconds after they are computed."""
 
 
 class TracksQuery(TagFilter, Period):

@@ -19,6 +19,7 @@
  * @property {(number | null)[]} semi_minor_m
  * @property {(number | null)[]} angle_rad
  * @property {("tracking" | "doubtful" | "unknown")[]} since_previous
+ * @property {(number | null)[]} off_m
  *
  * @typedef {object} TagTrack as in the contract
  * @property {string} tag
@@ -46,7 +47,7 @@
  */
 
 export const NUMBERS = /** @type {const} */ ([
-  "x", "y", "z", "z_std_m", "floor_probability", "heading_rad", "speed_mps", "sigma_pos_m", "semi_major_m", "semi_minor_m", "angle_rad",
+  "x", "y", "z", "z_std_m", "floor_probability", "heading_rad", "speed_mps", "sigma_pos_m", "semi_major_m", "semi_minor_m", "angle_rad", "off_m",
 ]);
 export const FIGURES = /** @type {const} */ (["poses", "tracked_s", "distance_m", "mean_speed_mps", "max_speed_mps"]);
 export const TRACKING = 0;

@@ -56,6 +56,8 @@ export class Track {
     this.z_std_m = part(all.number.z_std_m);
     /** What is known since the previous point: TRACKING, DOUBTFUL or UNKNOWN. */
     this.since = part(all.since);
+    /** How far stored poses since the previous point are from the line, at most, m; NaN: unknown. */
+    this.off_m = part(all.number.off_m);
     /** Figures over the whole time; NaN: unknown. */
     this.figure = {
       poses: all.figure.poses[row], tracked_s: all.figure.tracked_s[row], distance_m: all.figure.distance_m[row],

@@ -1,6 +1,9 @@
-/** Draw the stored track of a tag over a longer time: dashed where it is doubtful, broken where nothing is known. */
+/** Draw the stored track of a tag over a longer time: dashed where it is doubtful, faint dots where the line is only a sketch of it, broken where nothing is known. */
 
 import { DOUBTFUL, TRACKING } from "../data/packed_tracks.js";
+
+/** A line is drawn as one where no stored pose is farther from it. */
+const SKETCH_PX = 1;
 
 /** @typedef {import("../data/tracks.js").Track} Track @typedef {import("./scene.js").Scene} Scene */
 
@@ -10,11 +13,12 @@ export function drawTrack({ ctx, view, palette }, track, colour = "") {
   ctx.lineWidth = 1.5;
   ctx.lineJoin = "round";
   ctx.globalAlpha = 0.55;
-  for (const [known, dash] of /** @type {const} */ ([[TRACKING, []], [DOUBTFUL, [2, 4]]])) {
+  const isSketch = (/** @type {number} */ i) => !(track.off_m[i] * view.scale <= SKETCH_PX);
+  for (const [known, sketched, dash] of /** @type {const} */ ([[TRACKING, false, []], [DOUBTFUL, false, [2, 4]], [TRACKING, true, [1, 6]], [DOUBTFUL, true, [1, 6]]])) {
     ctx.setLineDash([...dash]);
     ctx.beginPath();
     for (let i = 1; i < track.time.length; i++) {
-      if (track.since[i] !== known) continue;
+      if (track.since[i] !== known || isSketch(i) !== sketched) continue;
       ctx.moveTo(view.screenX(track.x[i - 1]), view.screenY(track.y[i - 1]));
       ctx.lineTo(view.screenX(track.x[i]), view.screenY(track.y[i]));
     }

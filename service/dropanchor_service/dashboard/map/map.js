@@ -9,7 +9,7 @@ import { drawColours, drawElsewhere, drawMarkers, drawSelection } from "./draw_t
 import { DENSITY_ABOVE, drawDensity } from "./density.js";
 import { drawTrack } from "./draw_track.js";
 import { follow } from "../data/motion.js";
-import { MOST_TRACKS } from "../data/recent.js";
+import { MOST_TRACKS } from "../data/chosen_tracks.js";
 import { union } from "./outside.js";
 import { placesToFit } from "./places_to_fit.js";
 import { readPalette, withoutStates } from "./palette.js";

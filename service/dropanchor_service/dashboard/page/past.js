@@ -8,7 +8,7 @@ import { heightsOfTrack } from "../panel/height_plot.js";
 import { PastBar } from "../panel/past_bar.js";
 import { PastFigures } from "../panel/past_figures.js";
 import { PastTrails } from "../data/past_trails.js";
-import { RecentTracks } from "../data/recent.js";
+import { ChosenTracks } from "../data/chosen_tracks.js";
 import { HOUR_MS, lastHour } from "../data/periods.js";
 import { Replay } from "../data/replay.js";
 import { StoredTimes } from "../data/stored_times.js";
@@ -42,7 +42,7 @@ export class Past {
   replay = new Replay();
   #times = new StoredTimes();
   #trails = new PastTrails();
-  #recent = new RecentTracks();
+  #tracks = new ChosenTracks();
   #hasHistory = false;
   #shownAt = 0;
   #wroteAt = 0;
@@ -62,7 +62,8 @@ export class Past {
     this.replay.addEventListener("time", () => this.#show());
     this.replay.addEventListener("period", () => this.#askForTimes());
     for (const name of ["period", "state"]) this.replay.addEventListener(name, () => this.#writeAddress());
-    this.#recent.addEventListener("change", () => page.map.redraw());
+    this.replay.addEventListener("period", () => this.update());
+    this.#tracks.addEventListener("change", () => page.map.redraw());
     addEventListener("hashchange", () => this.#readAddress());
     document.addEventListener("keydown", (event) => this.#onKey(event));
     this.#tick(performance.now());
@@ -81,9 +82,12 @@ export class Past {
     if (!fleet.past) map.redraw();
   }
 
-  /** Request the recent tracks of the selected tags while the page shows the present. */
+  /** Request the tracks of the selected tags: recent ones, or those of the period that is shown. */
   update() {
-    if (this.#hasHistory && !this.active) this.#recent.request(this.page.choice.tags);
+    if (!this.#hasHistory) return;
+    const { from_ms, to_ms } = this.replay;
+    if (!this.active) this.#tracks.request(this.page.choice.tags);
+    else if (from_ms < to_ms) this.#tracks.requestPeriod(this.page.choice.tags, from_ms, to_ms);
   }
 
   enter() {
@@ -165,7 +169,7 @@ export class Past {
 
   /** Return the track of the period that is shown, or the recent one. @param {string | null} tag */
   #trackOf(tag) {
-    return this.active ? this.replay.figures.get(tag) : this.#recent.of(tag);
+    return this.#tracks.of(tag) ?? (this.active ? this.replay.figures.get(tag) : null);
   }
 
   /** Return the heights of a tag over the shown period. @param {string} tag */
