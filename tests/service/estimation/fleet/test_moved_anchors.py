@@ -110,8 +110,10 @@ def test_a_tag_that_stands_at_its_told_start_stays_there() -> None:
     fleet = engine()
     batch, _ = samples(3)
     still = cut(batch, 0, 3_000_000_000)
-    still.imu["gyro"], still.imu["acc"] = 0.0, (0.0, 0.0, 9.80665)
-    still.ranges["range"] = 10.0 + 0.1 * np.random.default_rng(3).standard_normal(len(still.ranges))
+    rng, size = np.random.default_rng(3), still.imu["acc"].shape
+    still.ranges["range"] = 10.0 + 0.1 * rng.standard_normal(len(still.ranges))
+    still.imu["gyro"] = 0.002 * rng.standard_normal(size)
+    still.imu["acc"] = (0.0, 0.0, 9.80665) + 0.01 * rng.standard_normal(size)
     still.headings["heading"] = still.headings["heading"][0]
     fleet.process(cut(still, 0, 2_000_000_000))
     assert not len(fleet.move_anchors(places((0.0, 3.0, 0.0))))

@@ -51,16 +51,17 @@ from dropanchor_service.estimation.fleet.belief.predict import fill_class_noise,
 from dropanchor_service.estimation.fleet.belief.publish import publish
 from dropanchor_service.estimation.fleet.belief.rigidity import RIGID_SLIP, follow_mount, slip_std_of, weight_power
 from dropanchor_service.estimation.fleet.belief.sliding import follow_sliding
+from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from dropanchor_service.estimation.fleet.belief.start import is_in_site_frame, uses_heading
 from dropanchor_service.estimation.fleet.belief.states import FAULT
 from dropanchor_service.estimation.fleet.belief.tilt import bends_tilt
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, Node, Nodes
+from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, RESTING, Node, Nodes
 from dropanchor_service.estimation.fleet.measurement.bearing import update_with_bearing
 from dropanchor_service.estimation.fleet.measurement.height import take_height
 from dropanchor_service.estimation.fleet.measurement.lateral import update_lateral
 from dropanchor_service.estimation.fleet.measurement.range import update_with_range
-from dropanchor_service.estimation.fleet.measurement.rest import update_standstill
+from dropanchor_service.estimation.fleet.measurement.rest import standing_log_likelihood, update_standstill
 from dropanchor_service.estimation.fleet.measurement.steps import update_steps
 from dropanchor_service.estimation.fleet.tuning import Tuning, TuningRecord
 
@@ -100,7 +101,10 @@ def _fuse_motion(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
     if is_in_site_frame(node.heading_kind):
         update_with_heading(work, count, row, node, t, scratch)
     if node.rest != MOVING:
+        undecided = node.rest == RESTING and row.quiet_share == QUIET_START  # no motion was certain yet
         for h in range(count):
+            if undecided:
+                work[h].log_weight += standing_log_likelihood(work[h], t)
             work[h].log_weight += update_standstill(work[h].mean, work[h].cov, scratch.PH, node, t)
     if node.carried == 1:
         for h in range(count):

@@ -2,11 +2,18 @@
 
 import math
 
-from dropanchor_service.estimation.fleet.belief.layout import GYRO_BIAS, Floats, V
+from dropanchor_service.estimation.fleet.belief.layout import GYRO_BIAS, Floats, Hypothesis, V
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import RESTING, Node
 from dropanchor_service.estimation.fleet.measurement.scalar import update_component
 from dropanchor_service.estimation.fleet.tuning import Tuning
+
+
+@njit(nogil=True)
+def standing_log_likelihood(one: Hypothesis, t: Tuning) -> float:
+    """Return the log likelihood of a speed of zero."""
+    S = one.cov[V, V] + t.rest_std**2
+    return float(-0.5 * one.mean[V] ** 2 / S - 0.5 * math.log(S))
 
 
 @njit(nogil=True, borrows=True)

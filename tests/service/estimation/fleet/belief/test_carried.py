@@ -16,6 +16,7 @@ from dropanchor_service.estimation.fleet.belief.births.carrying import (
     copy_turned_device,
     follow_motion,
     start_carried,
+    was_walked_off,
 )
 from dropanchor_service.estimation.fleet.belief.layout import (
     GAIT_OFFSET,
@@ -125,6 +126,13 @@ def test_who_is_carried_from_a_given_start_may_be_held_in_any_way_there() -> Non
     assert start_carried(work, 1, row, node, T.record()[0]) == T.grips
     np.testing.assert_allclose(work["mean"][: T.grips, R], 10.0)
     np.testing.assert_allclose(work["mean"][: T.grips, PHI], 0.0)
+
+
+@pytest.mark.parametrize("known", [0, 1])
+def test_who_walks_off_before_anything_is_certain_starts_again_only_where_no_start_was_told(known: int) -> None:
+    row, _, node = row_of_a_walk(2.0)
+    row["start"]["known"], row["publication"]["resolved"] = known, 0
+    assert was_walked_off(row, node, T.record()[0]) == (known == 0)
 
 
 def test_what_a_vehicle_took_for_an_error_of_the_platforms_heading_is_forgotten() -> None:

@@ -102,8 +102,10 @@ def was_walked_off(row: Row, node: Node, t: Tuning) -> bool:
 
     Its hypotheses are those of a vehicle that the steps accelerated, and no others are left.
     """
-    unknown = node.carried == 1 and row.walk.carried == 0 and row.publication.resolved == 0
-    return bool(unknown and is_on(WALKED_OFF, t) and is_on(CARRIED_START, t))  # else it would start so again and again
+    unknown = row.publication.resolved == 0 and row.start.known == 0
+    steps = node.carried == 1 and row.walk.carried == 0
+    allowed = is_on(WALKED_OFF, t) and is_on(CARRIED_START, t)  # else it would start so again and again
+    return bool(unknown and steps and allowed)
 
 
 @njit(nogil=True)

@@ -27,6 +27,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Anchors,
     Floats,
     Hypotheses,
+    Hypothesis,
     R,
     Row,
     V,
@@ -63,6 +64,7 @@ COLLECT_S: Final = 1.0  # s over which it collects them, unless it stands or STA
 STANDSTILL_S: Final = 0.7  # s that it waits at least, so that a standstill is seen
 RELATIVE_COURSE_VAR: Final = 1e-4  # rad^2, of a course that is the x axis of its frame
 REST_SPEED_VAR: Final = 0.01  # (m/s)^2
+STANDING: Final = 0.8  # share of the tags at a told start that stand
 
 
 @njit(nogil=True)
@@ -92,21 +94,42 @@ def _bearings(row: Row, t: Tuning) -> int:
 
 
 @njit(nogil=True)
-def _start_at_place(work: Hypotheses, row: Row, anchor: Anchor, node: Node, t: Tuning) -> int:
-    """Make one hypothesis at the given start, or a ring of headings where none is known. Return their count.
+def _set_speed(one: Hypothesis, k: int, reverse: int, cell: float) -> None:
+    """Give a hypothesis the k-th speed, ahead or in reverse, with a standard deviation of half a cell, m/s."""
+    one.mean[V] = (1.0 - 2.0 * reverse) * cell * (k + 0.5)
+    one.cov[V, V] = (cell / 2.0) ** 2
+    one.reverse = reverse
 
-    After a gap the start is in the frame in which the tag was.
+
+@njit(nogil=True)
+def _signs_at_place(row: Row, node: Node, t: Tuning) -> int:
+    """Return in how many directions a tag may move at its start: 0 if it rests, or goes on after a gap.
+
+    One that is mounted anyhow reverses as one that is mounted the other way round.
+    """
+    if node.rest == RESTING or row.start.after_gap == 1:
+        return 0
+    return 2 if row.settings.reverse_allowed == 1 and row.settings.mount_angle_std <= t.mount_cell else 1
+
+
+@njit(nogil=True)
+def _start_at_place(work: Hypotheses, row: Row, anchor: Anchor, node: Node, t: Tuning) -> int:
+    """Make the hypotheses at the given start, with a ring of headings where none is known. Return their count.
+
+    The place is told, and the speed is not: one stands, and others move with all speeds, unless the tag rests. After a
+    gap the start is in the frame in which the tag was, and so is the speed.
     """
     start, gap = row.start, row.gap
     x, y = start.x - anchor.x, start.y - anchor.y
     r = max(math.hypot(x, y), 1e-3)
     given = math.isfinite(start.heading)
     known = is_yaw_known(row, node)
-    ring = 1 if known else _bearings(row, t)
-    cell = TWO_PI / ring
+    signs = _signs_at_place(row, node, t)
+    ring = 1 if known else (t.coarse_bearings if signs > 0 else _bearings(row, t))
+    cell, moving = TWO_PI / ring, t.coarse_speeds * signs
     choose_model(row, node, t)
-    for h in range(ring):
-        yaw = start.heading if given else node.heading - row.heading.north + cell * h
+    for h in range(ring * (1 + moving)):
+        yaw = start.heading if given else node.heading - row.heading.north + cell * (h % ring)
         variance = start.heading_std**2 if given else node.heading_var
         _initialise(work, h, row, node, yaw, variance if known else (cell / 2.0) ** 2, t)
         s, P = work[h].mean, work[h].cov
@@ -114,14 +137,25 @@ def _start_at_place(work: Hypotheses, row: Row, anchor: Anchor, node: Node, t: T
         P[R, R] = start.std**2
         P[PHI, PHI] = (start.std / r) ** 2
         P[V, V] = start.speed_std**2
+        if h >= ring:
+            k = h // ring - 1
+            _set_speed(work[h], k // signs, k % signs, _fastest(row, t) / t.coarse_speeds)
+            work[h].log_weight = math.log((1.0 - STANDING) / STANDING / moving)
         if start.coarse == 1 and not known:
             turned = wrap(yaw - gap.yaw)
             work[h].log_weight = -0.5 * turned * turned / (gap.yaw_var + unobserved_turn_var(gap.turn_s))
     row.heading.in_site_frame = 0 if start.after_gap == 1 and gap.relative == 1 else 1
     if is_in_site_frame(node.heading_kind):
         _, slow, _ = reference_error(row, node.heading_var)
-        add_reference_error(work[0].cov, slow, not given)
-    return ring
+        for h in range(1 + moving):
+            add_reference_error(work[h].cov, slow, not given)
+    return int(ring * (1 + moving))
+
+
+@njit(nogil=True)
+def _fastest(row: Row, t: Tuning) -> float:
+    """Return the greatest speed, m/s, of the first hypotheses."""
+    return float(min(t.start_speed_max, row.settings.speed_max))
 
 
 @njit(nogil=True)
@@ -138,7 +172,7 @@ def _start_ring(
     bearings = _bearings(row, t)
     speeds = 1 if at_rest else (t.coarse_speeds if row.start.coarse == 1 else t.start_speeds) // signs
     cell = TWO_PI / bearings
-    speed_cell = min(t.start_speed_max, row.settings.speed_max) / speeds
+    speed_cell = _fastest(row, t) / speeds
     h = 0
     for i in range(bearings):
         for k in range(speeds):
@@ -147,9 +181,10 @@ def _start_ring(
                 s, P = work[h].mean, work[h].cov
                 s[R], s[PHI] = horizontal, cell * i
                 _spread_ring(P, row, cell, relative)
-                s[V] = 0.0 if at_rest else (1.0 - 2.0 * g) * speed_cell * (k + 0.5)
-                work[h].reverse = g
-                P[V, V] = REST_SPEED_VAR if at_rest else (speed_cell / 2.0) ** 2
+                if at_rest:
+                    P[V, V] = REST_SPEED_VAR
+                else:
+                    _set_speed(work[h], k, g, speed_cell)
                 if not relative and is_in_site_frame(node.heading_kind):
                     _, slow, _ = reference_error(row, node.heading_var)
                     add_common_rotation(P, slow)
