@@ -104,7 +104,8 @@ def _of_tables(path: Path, tables: Sequence[AnyTable], columns: ColumnMap) -> Fo
             placed = positions(table, Readings().left_out)
             parts.append((table.name, placed or Readings(notes=[why_unused(table, fields)])))
     if all(part.is_empty for _, part in parts):
-        raise ImportingError(_no_column(path, tables, columns))
+        advice = [note for _, part in parts for note in part.notes if "--map" in note]
+        raise ImportingError(". ".join([_no_column(path, tables, columns), *advice]))
     found.readings = merged(parts)
     return found
 

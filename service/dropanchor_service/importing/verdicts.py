@@ -11,6 +11,7 @@ from dropanchor_service.importing.join import Imu
 from dropanchor_service.importing.readings import ACC, GYRO, Ranges, Unit
 from dropanchor_service.importing.readings import RANGE as OF_RANGE
 
+_LEAST_COUNTS = 1_500.0  # m/s²: more than thousandths of g
 _MOST_RADPS = 36.0  # the usual range ends at 2000 deg/s
 _QUANTITY = {"acc_unit": ACC, "gyro_unit": GYRO, "range_unit": OF_RANGE}
 
@@ -24,15 +25,21 @@ def verdicts(imu: Imu, ranges: Ranges, units: Mapping[str, Unit]) -> list[str]:
 
 
 def _of_turns(imu: Imu, units: Mapping[str, Unit], found: Mapping[str, Finding]) -> list[str]:
-    """Return that turn rates whose unit nobody told are degrees, where no such sensor measures so many radians."""
-    unit = units.get(GYRO, Unit(None))
-    largest = float(np.abs(imu.gyro).max()) if len(imu) else 0.0
-    if unit.name is not None or largest <= _MOST_RADPS or any(_QUANTITY.get(name) == GYRO for name in found):
+    """Return that values without a unit are counts of the sensor, or that turn rates are degrees, where they are so
+    large that no such sensor measures them in m/s² and rad/s."""
+    acc, gyro = units.get(ACC, Unit(None)), units.get(GYRO, Unit(None))
+    if not len(imu) or gyro.name is not None or any(_QUANTITY.get(name) == GYRO for name in found):
         return []
-    words = " ".join(f"{word}:deg/s" for word in unit.given)
-    return [
-        f"Turn rates of {largest:.3g} rad/s are more than such a sensor measures: are they deg/s? Here: --map {words}"
-    ]
+    largest, force = float(np.abs(imu.gyro).max()), float(np.median(np.linalg.norm(imu.acc, axis=1)))
+    if acc.name is None and force > _LEAST_COUNTS:
+        words = [*(f"{word}:g/16384" for word in acc.given), *(f"{word}:deg/s/131" for word in gyro.given)]
+        said = "The values look like counts of the sensor. With its usual ranges, ±2 g and ±250 deg/s"
+        return [f"{said}: --map {' '.join(words)}"]
+    if largest <= _MOST_RADPS:
+        return []
+    words = [f"{word}:deg/s" for word in gyro.given]
+    said = f"Turn rates of {largest:.3g} rad/s are more than such a sensor measures: are they deg/s? Here"
+    return [f"{said}: --map {' '.join(words)}"]
 
 
 def _samples(imu: Imu, ranges: Ranges, anchor: str) -> SampleBatch:

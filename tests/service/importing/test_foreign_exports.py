@@ -61,6 +61,11 @@ EXPORTS = {
         lambda i: (51400 + i, 777_000 + 100 * i, 0, 0, G, 0, 0, 0.5),
         "\t",
     ),
+    "SensorLog of an iPhone": table(
+        "loggingTime(txt),accelerometerAccelerationX(G),accelerometerAccelerationY(G),accelerometerAccelerationZ(G),"
+        "gyroRotationX(rad/s),gyroRotationY(rad/s),gyroRotationZ(rad/s),motionUserAccelerationX(G)",
+        lambda i: (f"2026-11-26T08:00:00.{10 * i:03}+01:00", 0, 0, -1, 0, 0, 0.5, 0),
+    ),
     "rostopic echo -p": table(
         "%time,field.header.seq,"
         + ",".join(f"field.{name}.{axis}" for name in ("angular_velocity", "linear_acceleration") for axis in "xyz"),
@@ -177,6 +182,23 @@ def test_each_advice_works_as_it_is_printed_and_changes_nothing_else(run: Import
     assert min(ended.column("range", "range_m")) > 0
     assert "log.txt: 30 left out: the range is below zero" in ended.printed
     assert "Here:" not in ended.printed
+
+
+def test_counts_of_a_sensor_are_named_with_their_usual_scale(run: Import) -> None:
+    source = run.file(
+        "mpu.csv", table("ms,AcX,AcY,AcZ,Tmp,GyX,GyY,GyZ", lambda i: (10 * i, 0, 0, 16384, 24, 0, 0, 655))
+    )
+    first = run(source, "--map", "t=ms:ms", imu=True)
+    ended = run(source, "--map", "t=ms:ms", *advice(first, "±250 deg/s:"), "--force", imu=True)
+    assert ended.column("imu", "az") == pytest.approx([G] * 60)
+    assert ended.column("imu", "gz") == pytest.approx([math.radians(5)] * 60)
+    assert "look like counts" not in ended.printed
+
+
+def test_columns_called_like_anchors_may_be_the_only_ranges(run: Import) -> None:
+    source = run.file("wide.csv", table("time_s,UWB_1,UWB_2", lambda i: (i / 10, 3.1, 4.2)))
+    refused = run(source)
+    assert "are UWB_1, UWB_2 ranges? --map range.UWB_1=UWB_1:m range.UWB_2=UWB_2:m says so" in refused.error
 
 
 def test_a_field_without_a_column_is_left_out(run: Import) -> None:

@@ -9,8 +9,8 @@ from dropanchor_service.importing.tables.mapping import ANCHOR, POSITION, T_NSEC
 from dropanchor_service.importing.tables.units import SI, known
 
 _SENSORS = {
-    ACC: {"a", "acc", "accel", "accelerometer", "acceleration", "accelerations", "accelero", "lsm6acc", "force"},
-    GYRO: {"g", "w", "gyr", "gyro", "gyros", "gyroscope", "omega", "angular", "rotation", "rot"},
+    ACC: {"a", "acc", "accel", "accelerometer", "acceleration", "accelerations", "accelero", "lsm6acc", "force", "ac"},
+    GYRO: {"g", "w", "gyr", "gy", "gyro", "gyros", "gyroscope", "omega", "angular", "rotation", "rot"},
     MAG: {"m", "mag", "magn", "magnet", "magnetometer", "magnetic", "b", "compass"},
 }
 _WITHOUT_GRAVITY = {"linear", "lin", "user", "free", "world", "filtered", "raw"}  # used where there is nothing else
@@ -41,7 +41,7 @@ _TIMES_WITH_UNIT = {
 }
 _OF_TIMES = {"header", "field", "unix", "utc", "sensor", "system", "sys", "device", "host", "since", "start", "boot"}
 _OF_TIMES |= {"log", "elapsed", "local", "gps", "imu", "uwb", "recv", "received", "sample", "of", "iso", "monotonic"}
-_OF_TIMES |= {"day", "in", "fine", "utctime"}
+_OF_TIMES |= {"day", "in", "fine", "utctime", "logging"}
 _NANOSECONDS = {"nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"}
 _RANGES = {"range", "ranges", "dist", "distance", "distances", "d", "r", "uwb", "tof", "twr", "measured", "measurement"}
 _RANGES |= {"rng", "slant", "ranging", "value"}
@@ -60,6 +60,8 @@ _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+|°/?s?")
 
 
 _ROSTOPIC = "field."  # rostopic echo -p puts it before each name
+_OF_APPLE = "accelerometerAcceleration"  # of SensorLog: as iPhones give it, -1 upwards at rest
+_TEMPERATURE = re.compile(r"°|(?:°|deg)? ?[CFK]", re.IGNORECASE)
 _G_FORCE = re.compile(r"^g[ _-]?f(?:orce)?[ _-]?[xyz]$", re.IGNORECASE)
 _UNITS_OF_SENSORS = {
     GYRO: re.compile(r".*(?:/s|s-1|s\^-1|dps)"),
@@ -69,11 +71,12 @@ _UNITS_OF_SENSORS = {
 
 
 class _Found(NamedTuple):
-    """field: of the mapping. unit: as the name tells it. rank: the smaller, the better."""
+    """field: of the mapping. unit: as the name tells it. rank: the smaller, the better. sign: as of a column."""
 
     field: str
     unit: str | None
     rank: int
+    sign: int = 1
 
 
 def guessed(columns: Sequence[str], table: str = "") -> dict[str, Column]:
@@ -85,7 +88,7 @@ def guessed(columns: Sequence[str], table: str = "") -> dict[str, Column]:
     for name in columns:
         found = _found(name) or _of_table(table, name)
         if found and (found.field not in best or found.rank < best[found.field][0]):
-            best[found.field] = found.rank, Column(name, found.unit)
+            best[found.field] = found.rank, Column(name, found.unit, found.sign)
     fields = {field: column for field, (_, column) in best.items()}
     if T_NSEC in fields and T not in fields:
         fields[T] = Column(fields.pop(T_NSEC).name, "ns")
@@ -136,6 +139,8 @@ def _found(name: str) -> _Found | None:
     if bracketed and bracketed[1] and not bracketed[2].isdigit():
         words = words_of_name(bracketed[1])
         found = _identified(words) or _by_unit(words, bracketed[2])
+        if found and name.startswith(_OF_APPLE):
+            found = found._replace(sign=-1)
         return found and _with_unit(found, bracketed[2], name)
     words = words_of_name(name)
     if _G_FORCE.search(name) and words[-1][-1] in _AXES:  # always with gravity, where others beside it may lack it
@@ -155,6 +160,7 @@ def _by_unit(words: list[str], unit: str) -> _Found | None:
     """Return the axis of a sensor that only its unit tells, as `AsX(°/s)` and `HX(uT)`."""
     of_sensor = (quantity for quantity, units in _UNITS_OF_SENSORS.items() if units.fullmatch(unit))
     quantity = next(of_sensor, None) if known(unit, MAG) or known(unit, ACC) or known(unit, GYRO) else None
+    words = words[:1] if words[1:] == ["axis"] else words  # of MetaWear: x-axis (g)
     axis = words[-1][-1] if words and not _NOT_A_READING & set(words) else ""
     return (
         None
@@ -175,7 +181,7 @@ def _with_unit(found: _Found, unit: str, name: str) -> _Found | None:
     if quantity is None or not unit:
         return found
     if known(unit, quantity) is None and found.field == T:
-        return None  # T(°C) is a temperature
+        return None if _TEMPERATURE.fullmatch(unit) else found  # loggingTime(txt) is ISO 8601
     if known(unit, quantity) is None:
         raise ImportingError(
             f"the column {name!r} has the unit {unit!r}, which is not known: say with --map what it is, as "

@@ -2,7 +2,7 @@
 
 import shlex
 from array import array
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -69,7 +69,8 @@ def why_unused(table: Table, fields: Fields) -> str:
     """Return why nothing of a table is used, and what would change that."""
     sampled = Sampled(table)
     if T in fields:
-        return f"{table.name}: not used: only its time is known, of {', '.join(table.columns[:12])}"
+        why = f"{table.name}: not used: only its time is known, of {', '.join(table.columns[:12])}"
+        return "; ".join([why, *_maybe_ranges(table, unused(table.columns, dict(fields)))])
     readings = [column.name for name, column in fields.items() if name in QUANTITIES]
     if not readings:
         return f"{table.name}: not used: its columns {', '.join(table.columns[:12])} hold no known reading"
@@ -131,10 +132,14 @@ def _left(table: Table, fields: Fields) -> list[str]:
     left = unused(table.columns, dict(fields))
     said = [f"{table.name}: not used: {', '.join(left[:12])}{', …' if len(left) > 12 else ''}"] if left else []
     has_ranges = any(name == RANGE or name.startswith(WIDE) for name in fields)
-    if not has_ranges and (maybe := may_be_ranges(Sampled(table), left)):
-        words = " ".join(shlex.quote(f"{WIDE}{name}={name}:m") for name in maybe)
-        said.append(f"{table.name}: are {', '.join(maybe)} ranges? --map {words} says so")
-    return said
+    return said if has_ranges else [*said, *_maybe_ranges(table, left)]
+
+
+def _maybe_ranges(table: Table, columns: Sequence[str]) -> list[str]:
+    """Return a sentence on those of the columns that may be ranges, if there are any."""
+    maybe = may_be_ranges(Sampled(table), columns)
+    words = " ".join(shlex.quote(f"{WIDE}{name}={name}:m") for name in maybe)
+    return [f"{table.name}: are {', '.join(maybe)} ranges? --map {words} says so"] if maybe else []
 
 
 def _times(found: Collected, fields: Fields) -> Times:

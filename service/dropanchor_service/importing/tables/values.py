@@ -21,7 +21,7 @@ _FAR = {"to", "dst", "dest", "destination", "peer", "target", "responder", "remo
 _NEAR = {"from", "src", "source", "initiator", "local", "tag"}
 _IDS = {"id", "mac", "addr", "address", "node", "device", "short", "uwb", "name"} | _FAR | _NEAR
 _COUNTERS = {"counter", "count", "packet", "frame", "index", "seq", "sequence", "sample", "samples", "row"}
-_SHORT_ID = re.compile(r"[A-Za-z]{1,2}\d{1,3}")
+_SHORT_ID = re.compile(r"(?:[a-z]{1,2}|uwb|anchor|anc|beacon)[ _-]?\d{1,3}", re.IGNORECASE)
 _REACH_M = 300.0
 
 

@@ -48,6 +48,13 @@ LINES = [
     (["Distance: 312", "GOT DATA - Type: 1"], "Distance: {range:cm}"),
     (["d=1.5", "d=2.5"], "d={range:m}"),
     (["dist 45000"], "dist {range:mm}"),
+    (["Distance (m): 3.21"], "Distance (m): {range:m}"),
+    (["t=5120 mm=300"], None),
+    (['{"ranges":{"A1":3.2,"A2":4.5}}'], "json: ranges[key] -> anchor, ranges[] -> range:m"),
+    (
+        ["Accel: 0.1, 0.2, 9.8 Gyro: 1, 2, 3 deg/s"],
+        "Accel: {ax:m/s2}, {ay:m/s2}, {az:m/s2} Gyro: {gx:deg/s}, {gy:deg/s}, {gz:deg/s}",
+    ),
     (['{"results":[{"Addr":"0x0001","D_cm":155}]}'], "json: results[].Addr -> anchor, results[].D_cm -> range:cm"),
     (['{"anchor":"A","distance":3.2}'], "json: anchor -> anchor, distance -> range:m"),
     (

@@ -8,10 +8,16 @@ from dropanchor_tag_client.sources.modules.patterns.fields import ACC, GYRO, MAG
 
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 _NAMED = re.compile(rf"(?P<name>[A-Za-z]+(?:[ _.][XYZxyz])?)\W{{0,2}}?[:= ,\t]{{1,2}}(?P<number>{_NUMBER.pattern})")
-_SENSORS = ((ACC, r"a|acc|accel|accelerometer"), (GYRO, r"g|gyr|gyro|w|rot"), (MAG, r"m|mag|magn"))
+_SENSORS = ((ACC, r"a|ac|acc|accel|accelerometer"), (GYRO, r"g|gy|gyr|gyro|w|rot"), (MAG, r"m|mag|magn"))
 _COUNTS = {6: (*ACC, *GYRO), 7: (*ACC, *GYRO), 9: (*ACC, *GYRO, *MAG), 10: (*ACC, *GYRO, *MAG)}
 _GRAVITY = (("m/s2", 9.8), ("g", 1.0), ("mg", 1000.0))
 _SLACK = 1.25
+_WORDS = {"acc", "accel", "acceleration", "accelerometer", "gyr", "gyro", "gyroscope", "mag", "imu", "x", "y", "z"} | {
+    "deg",
+    "dps",
+    "rad",
+    "s",
+}
 
 
 def imu_patterns(line: str) -> Iterator[str]:
@@ -22,9 +28,16 @@ def imu_patterns(line: str) -> Iterator[str]:
             line, {axis: span for axis, span in named.items() if axis not in MAG or set(MAG) <= set(named)}
         )
     spans = [found.span() for found in _NUMBER.finditer(line)]
-    if re.search("[A-Za-z]", _NUMBER.sub("", line)) is None and (axes := _COUNTS.get(len(spans))):
+    words = [word.lower() for word in re.findall("[A-Za-z]+", _NUMBER.sub("", line))]
+    if set(words) <= _WORDS and _is_acc_first(words) and (axes := _COUNTS.get(len(spans))):
         for first in reversed(range(len(spans) - len(axes) + 1)):  # a time stands before them
             yield from _written(line, dict(zip(axes, spans[first:], strict=False)))
+
+
+def _is_acc_first(words: list[str]) -> bool:
+    """Return whether the words, if there are any, name accelerations and then turn rates."""
+    kinds = [word[0] for word in words if word[0] in "ag"]
+    return not words or kinds == ["a", "g"]
 
 
 def _axis(name: str) -> str | None:

@@ -15,9 +15,10 @@ from dropanchor_tag_client.sources.modules.patterns.parser import Pattern, patte
 _NUMBER = r"(?P<number>-?\d+(?:\.\d+)?)"
 _RANGES = (
     re.compile(
-        rf"(?P<word>\b(?:range|ranging|distance|dist|d)\b\W{{0,3}}){_NUMBER} ?(?P<unit>mm|cm|ft|m)(?![\w/])", re.I
+        rf"(?P<word>\b(?:range|ranging|distance|dist|d)\b\W{{0,3}}){_NUMBER} ?(?P<unit>mm|cm|ft|m)(?![\w/]| ?=)", re.I
     ),
-    re.compile(rf"(?P<word>){_NUMBER} ?(?P<unit>mm|cm|ft|m)(?![\w/])"),
+    re.compile(rf"(?P<word>){_NUMBER} ?(?P<unit>mm|cm|ft|m)(?![\w/]| ?=)"),
+    re.compile(rf"(?P<word>\b(?:range|distance|dist|d) ?[\[(](?P<unit>mm|cm|ft|m)[\])]\W{{1,3}}){_NUMBER}", re.I),
     re.compile(rf"(?P<word>\b(?:range|distance|dist|d)(?:\b|_)[^\w.-]{{1,3}}){_NUMBER}(?![\w.])", re.I),
 )
 _ANCHOR = re.compile(
@@ -29,6 +30,7 @@ _ANCHOR = re.compile(
 _TOKEN_WITH_DIGIT = re.compile(r"-?(?:0x)?[A-Fa-f]*\d[\dA-Fa-f.]*(?::[\dA-Fa-f]+)*")
 _TIME = re.compile(r"\{_\}(?= ?(?P<unit>ms|us|s)\b)")
 _DISTANCE_KEYS = re.compile(r"^(?:range|dist|distance|raz|d|r)(?:_?(?P<unit>mm|cm|m|meters?|in|ft))?$", re.IGNORECASE)
+_DISTANCES = re.compile(r"^(?:ranges?|dists?|distances?|anchors)$", re.IGNORECASE)
 _ANCHOR_KEYS = re.compile(r"^(?:.*anchor.*|.*addr.*|dst|ouid|id|a|mac)$", re.IGNORECASE)
 _METRES, _CENTIMETRES = 100, 3000  # numbers without a unit are hardly m beyond the one, and hardly cm beyond the other
 _CLOCK_LINES = 3
@@ -146,6 +148,9 @@ def _of_json(value: Any, path: str) -> str | None:
         return _of_json(value[0], f"{path}[]") if value and "[]" not in path else None
     if not isinstance(value, dict):
         return None
+    for key, one in value.items():
+        if isinstance(one, dict) and one and _DISTANCES.match(key) and all(map(_is_number, one.values())):
+            return f"{_joined(path, key)}[key] -> anchor, {_joined(path, key)}[] -> range:?"
     numbers = [(key, match) for key, one in value.items() if _is_number(one) and (match := _DISTANCE_KEYS.match(key))]
     if numbers:
         key, match = numbers[0]
