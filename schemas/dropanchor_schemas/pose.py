@@ -35,6 +35,7 @@ class StateReason(StrEnum):
     FAULT = "fault"
     HEADING_UNSURE = "heading_unsure"
     SENSOR_FAULT = "sensor_fault"
+    ANCHOR_DOUBTED = "anchor_doubted"
 
 
 class Frame(StrEnum):

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from dropanchor_schemas.sentences import say
+from dropanchor_service.answers.doubted_anchors import about_anchors
 from dropanchor_service.answers.findings import sentence_of
 from dropanchor_service.answers.unused import hints_about_unused
 from dropanchor_service.estimation.columns import Array, Frame, HeightSource, StateReason
@@ -47,6 +48,9 @@ _HINTS = {
     ),
     StateReason.SENSOR_FAULT: say(
         "sensor_fault", "A sensor of this tag failed its check: look at what this tag needs."
+    ),
+    StateReason.ANCHOR_DOUBTED: say(
+        "anchor_doubted", "An anchor seems to have moved: say where it is, or save it again to confirm its place."
     ),
 }
 HINTS = [_HINTS[reason] for reason in StateReason]
@@ -164,6 +168,9 @@ def hints_of(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> Hint
         hint[at] = len(texts)
         texts.append(text)
     for text, one in _about_sensors(poses, tags):
+        hint[one] = len(texts)
+        texts.append(text)
+    for text, one in about_anchors(poses, tags):
         hint[one] = len(texts)
         texts.append(text)
     for text, wrong in _wrong_times(poses, tags, now_ns):

@@ -41,6 +41,7 @@ from dropanchor_service.estimation.columns import (
 )
 from dropanchor_service.estimation.plausibility.check import SensorCheck
 from dropanchor_service.ingest.decode import read_forms, read_samples
+from dropanchor_service.ingest.kernels.anchors import HEARD, STEP, follow_anchors
 from dropanchor_service.ingest.kernels.arrivals import record_arrivals
 from dropanchor_service.ingest.kernels.starts import OPEN, follow_starts
 from dropanchor_service.ingest.kernels.values import shift_times, time_spans
@@ -265,6 +266,7 @@ def _ingest(payloads: list[bytes]) -> None:
         *(arrivals.columns, arrivals.are_conspicuous, read.forms, of_turn.rows, of_turn.arrived, sequenced.due),
         *(np.zeros(n, np.int64), newest_of, decoded.ranges),
     )
+    follow_anchors(np.zeros(n, INNOVATION), np.zeros(n, HEARD), np.zeros(n, STEP))
     follow_starts(np.zeros(n, POSE), np.zeros(n, INNOVATION), np.zeros(n, OPEN), np.zeros(n, np.int64))
 
 

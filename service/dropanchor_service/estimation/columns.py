@@ -4,6 +4,7 @@ Units: SI and rad; times int64 ns on one clock; the site frame is ENU with x eas
 y left, z up. An unknown float is NaN.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 from operator import attrgetter
@@ -199,6 +200,7 @@ class StateReason(IntEnum):
     FAULT = 10  # the row's numbers were not finite; it starts again
     HEADING_UNSURE = 11  # the heading may be wrong by a constant, and with it the direction from the anchor
     SENSOR_FAULT = 12  # a sensor failed its check; engines do not give it
+    ANCHOR_DOUBTED = 13  # an anchor seems to have moved; engines do not give it
 
 
 @dataclass(frozen=True)
@@ -219,6 +221,14 @@ class SampleBatch:
         """Return the column of every kind, in the order of `KINDS`."""
         columns: tuple[Array, ...] = _columns_of(self)
         return columns
+
+    def rows(self) -> Array:
+        """Return the rows of all samples, each once, in ascending order."""
+        return np.unique(np.concatenate([column["row"] for column in self.columns()]))
+
+    def selected(self, selects: Callable[[Array], Array]) -> "SampleBatch":
+        """Return the samples whose rows are selected."""
+        return SampleBatch(*(column[selects(column["row"])] for column in self.columns()))
 
 
 _columns_of = attrgetter(*SampleBatch.__dataclass_fields__)

@@ -14,10 +14,11 @@ _NUMBER_BITS = 32  # of an anchor number
 
 
 class Change(NamedTuple):
-    """Whether an anchor of a site has moved, and whether one has turned."""
+    """Whether an anchor of a site has moved, whether one has turned, and whether somebody has said where one is."""
 
     moved: bool
     turned: bool
+    told: bool
 
 
 class AnchorTable:
@@ -34,6 +35,7 @@ class AnchorTable:
         self.places = np.zeros(0, ANCHOR)
         self.facings = np.zeros(0)
         self.sites = np.zeros(0, np.int32)
+        self._told: dict[int, int] = {}  # by index of the site: how often somebody has said where an anchor is
         self._indices: dict[int, Array] = {}  # by index of the site: where its anchors are, in the order of its store
         self._own = np.full(1, -1, np.int32)  # index within its site of each anchor, and -1 for no anchor
         self._keys = np.zeros(0, np.int64)  # of the anchors that the sites have now: site and number, ascending
@@ -49,7 +51,14 @@ class AnchorTable:
         self._append(np.full(len(places) - len(known), site.index, np.int32))
         self.places[self._of(site.index)], self.facings[self._of(site.index)] = places, facings
         self._find_by_number(site)
-        return Change(moved, turned)
+        before = self._told.get(site.index, 0)
+        self._told[site.index] = site.store.anchors_told
+        return Change(moved, turned, before != site.store.anchors_told)
+
+    def of_site(self, site: int) -> list[int]:
+        """Return the indices of the anchors that a site has or had."""
+        of_site: list[int] = self._of(site).tolist()
+        return of_site
 
     def restore(self, sites: Sequence[int]) -> None:
         """Give the anchors of an earlier table the same indices. Every site has to be followed again.

@@ -1,7 +1,7 @@
 """Run the engine so that it follows changes of the sites, and so that a fault of one row harms no other row."""
 
 import logging
-from collections.abc import Callable, Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence, Set
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from dropanchor_service.estimation.columns import (
 )
 from dropanchor_service.estimation.plausibility.check import Checked, SensorCheck
 from dropanchor_service.estimation.plausibility.layout import make_checks
+from dropanchor_service.ingest.anchor_watch import AnchorWatch
 from dropanchor_service.ingest.anchors import AnchorTable
 from dropanchor_service.ingest.configured import Configured
 from dropanchor_service.ingest.decode import Decoded
@@ -58,6 +59,7 @@ class GuardedEngine:
         self._norths = NorthWatch(engine, sites.rows.norths)
         self._references = PressureReferences(engine)
         self._heights = ToldHeights()
+        self._anchor_watch = AnchorWatch(sites.rows.anchor_doubts, self._anchor_id)
 
     @property
     def keeps_state(self) -> bool:
@@ -97,6 +99,7 @@ class GuardedEngine:
                 self._note(row, current)
                 self._starts.resume(row, current.tag)
                 self._norths.tell(row, current.tag)
+                self._anchor_watch.begin(row)
                 self._references.resume(self._sites.of_row(row).index, row, current.tag)
         self._has_configured = np.zeros(len(settings), bool)
         self._has_configured[list(self._configured)] = True
@@ -123,6 +126,8 @@ class GuardedEngine:
         afresh = self._move([site for site, change in zip(changed, changes, strict=True) if change.moved])
         for site, change in zip(changed, changes, strict=True):
             self._follow_settings(site, afresh, restart=change.turned)
+            if change.told:
+                self._anchor_watch.told(self.anchors.of_site(site.index))
         return changed
 
     def _move(self, moved: Sequence[ServedSite]) -> set[int]:
@@ -161,6 +166,11 @@ class GuardedEngine:
         """Return the engine's index for each anchor number that the tag of a row sent, -1 if its site lacks it."""
         return self.anchors.indices(self._sites.rows.sites(rows), numbers)
 
+    def _anchor_id(self, index: int) -> str:
+        """Return the id of an anchor, as its site has it."""
+        store = self._sites[int(self.anchors.sites[index])].store
+        return store.anchors_by_index()[int(self.anchors.own_indices(np.array([index]))[0])].id
+
     def prepare(self, row: int) -> None:
         """Configure a row before its first message arrives, so that the message does not wait for it."""
         if row not in self._configured:
@@ -182,6 +192,7 @@ class GuardedEngine:
         usable = with_lasting_errors(checked.samples, self.anchors)
         for batch in self._bisected(usable, now_ns) if any(map(len, usable.columns())) else ():
             self._starts.look(batch)
+            self._anchor_watch.look(batch)
             self._sensors.mark(batch.poses)
             self._heights.mark(batch.poses)
             self._norths.look(now_ns)
@@ -229,13 +240,13 @@ class GuardedEngine:
         try:
             poses = self._engine.process(samples)
         except Exception as error:
-            rows = _rows(samples)
+            rows = samples.rows()
             if len(rows) == 1:
                 poses = self._fault(int(rows[0]), samples, error, now_ns)
             else:
                 middle = rows[len(rows) // 2]
-                yield from self._bisected(_selected(samples, lambda row: row < middle), now_ns)
-                yield from self._bisected(_selected(samples, lambda row: row >= middle), now_ns)
+                yield from self._bisected(samples.selected(lambda row: row < middle), now_ns)
+                yield from self._bisected(samples.selected(lambda row: row >= middle), now_ns)
                 return
         yield poses
 
@@ -259,6 +270,7 @@ class GuardedEngine:
         # After a fault or a restart the tag is no longer where it started.
         told = current if start_known else current.with_start(None)
         self._norths.tell(row, told.tag)
+        self._anchor_watch.begin(row)
         self._measured.begin(row, is_known=told.tag.start is not None)
         self._engine.configure(row, told.columns())
         if start_known:
@@ -285,11 +297,3 @@ class GuardedEngine:
         store = self._sites.of_row(row).store
         tag, site = store.tag_settings(self._sites.rows.at(row).name), store.site
         return Configured(tag, site.declination_rad, site.declination_std_rad)
-
-
-def _rows(samples: SampleBatch) -> Array:
-    return np.unique(np.concatenate([column["row"] for column in samples.columns()]))
-
-
-def _selected(samples: SampleBatch, selects: Callable[[Array], Array]) -> SampleBatch:
-    return SampleBatch(*(column[selects(column["row"])] for column in samples.columns()))

@@ -10,6 +10,7 @@ import numpy as np
 from dropanchor_schemas import kinds
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array
+from dropanchor_service.store.anchor_doubts import AnchorDoubts
 from dropanchor_service.store.arrivals import Arrivals
 from dropanchor_service.store.findings import SensorFindings
 from dropanchor_service.store.norths import Norths
@@ -103,6 +104,7 @@ class Rows:
         self._deleted: frozenset[int] = frozenset()
         self.arrivals = Arrivals()
         self.findings = SensorFindings()
+        self.anchor_doubts = AnchorDoubts()
         self.norths = Norths()
         self.start_news = StartNewsQueue()
         self.wrong_times = WrongTimes()

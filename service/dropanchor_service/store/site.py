@@ -28,11 +28,12 @@ class SiteStore:
 
     The ingest thread writes when it places the first anchor that a tag ranges to. `version` grows with every change,
     so that one comparison detects a change. floors: those of the plans. epoch: grows when another process of a cluster
-    takes the site over; 0 without a cluster. layers: where the configured values are from.
+    takes the site over; 0 without a cluster. layers: where the configured values are from. anchors_told: how often
+    somebody said where one is.
     """
 
     epoch = 0
-    floors = NO_FLOORS
+    floors, anchors_told = NO_FLOORS, 0
     layers: Sequence[Layer] = ()
 
     def __init__(
@@ -190,6 +191,7 @@ class SiteStore:
                         site=repr(self.site.id),
                     )
                 )
+            self.anchors_told += 1
             self._replace_site(site, Change("site", site.id, self.site, site))
 
     def anchor(self, anchor: str) -> Anchor | None:
@@ -204,6 +206,7 @@ class SiteStore:
         with self._lock:
             before = self.anchor(anchor.id)
             require(allows, before)
+            self.anchors_told += 1
             self._replace_site(self._document.site_with(anchor), Change("anchor", anchor.id, before, anchor))
 
     def remove_anchor(self, anchor: str, allows: Precondition = always) -> None:

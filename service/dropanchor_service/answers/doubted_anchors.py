@@ -1,0 +1,28 @@
+"""Which anchor seems to have moved, as a hint about the poses that rest on it."""
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+
+import numpy as np
+
+from dropanchor_schemas.sentences import say
+from dropanchor_service.estimation.columns import Array, StateReason
+from dropanchor_service.store.tags import TagTable
+
+
+def anchor_moved(anchor: str, way_m: float, since_ns: int) -> str:
+    return say(
+        "anchor_moved",
+        "Anchor {anchor} seems to have moved by {way} m or more at {time} UTC: say where it is, or save it again to "
+        "confirm its place.",
+        anchor=anchor,
+        way=f"{way_m:.1f}",
+        time=datetime.fromtimestamp(since_ns // 10**9, UTC).strftime("%H:%M:%S"),
+    )
+
+
+def about_anchors(poses: Array, tags: TagTable) -> Iterator[tuple[str, int]]:
+    """Yield which anchor seems to have moved, and the place of each pose that rests on it."""
+    for place in np.flatnonzero(poses["reason"] == StateReason.ANCHOR_DOUBTED).tolist():
+        if (doubt := tags.rows.anchor_doubts.of(int(poses["row"][place]))) is not None:
+            yield anchor_moved(*doubt), place

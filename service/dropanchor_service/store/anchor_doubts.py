@@ -1,0 +1,32 @@
+"""Anchors that no longer seem to be where the site says they are."""
+
+from typing import NamedTuple
+
+
+class AnchorDoubt(NamedTuple):
+    """anchor: its id. way_m: how far it has moved at least. since_ns: when, UTC."""
+
+    anchor: str
+    way_m: float
+    since_ns: int
+
+
+class AnchorDoubts:
+    """Doubts by row of a tag that hears such an anchor. The ingest thread writes; any thread reads."""
+
+    def __init__(self) -> None:
+        self._of_rows: dict[int, AnchorDoubt] = {}
+
+    def of(self, row: int) -> AnchorDoubt | None:
+        """Return the anchor of a tag that is in doubt, None if there is none."""
+        return self._of_rows.get(row)
+
+    def set(self, row: int, doubt: AnchorDoubt) -> None:
+        """Replace what is known about a row."""
+        self._of_rows[row] = doubt
+
+    def end(self, doubt: AnchorDoubt) -> None:
+        """Forget a doubt, whichever tags it is of."""
+        for row, known in list(self._of_rows.items()):
+            if known is doubt:
+                self._of_rows.pop(row, None)
