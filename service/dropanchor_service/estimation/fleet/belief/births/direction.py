@@ -120,11 +120,17 @@ def wait_to_turn(row: Row, node: Node) -> None:
 
 
 @njit(nogil=True)
+def _speed_of(one: Hypothesis, node: Node) -> float:
+    """Return how fast a tag may be: without an accelerometer, slow ranges leave a speed at 0 that only is not known."""
+    return float(abs(one.mean[V]) if math.isfinite(node.dv_var) else math.sqrt(one.mean[V] ** 2 + one.cov[V, V]))
+
+
+@njit(nogil=True)
 def follow_rest(work: Hypotheses, count: int, row: Row, node: Node) -> None:
     """Count the time at rest, where no hypothesis has a direction, and the way from the start."""
     row.stood_s = row.stood_s + node.dt_s if node.rest == RESTING else 0.0
     if node.rest != RESTING and row.start.way < DRIVEN:
-        row.start.way += abs(work[best_of(work, count)].mean[V]) * node.dt_s
+        row.start.way += _speed_of(work[best_of(work, count)], node) * node.dt_s
     if node.rest == RESTING:
         for h in range(count):
             work[h].reverse = 0
