@@ -36,6 +36,7 @@ class StateReason(StrEnum):
     HEADING_UNSURE = "heading_unsure"
     SENSOR_FAULT = "sensor_fault"
     ANCHOR_DOUBTED = "anchor_doubted"
+    FRONT_OR_BACK = "front_or_back"
 
 
 class Frame(StrEnum):

@@ -79,8 +79,12 @@ class Anchor(_Settings):
     facing_rad: Number | None = Field(
         default=None,
         description="Where an anchor that measures azimuths faces, counter-clockwise from the site's x axis. It is "
-        "added to the bearings of its tags, and these tell where a tag starts: no tag may be behind an anchor that "
-        "cannot tell behind from ahead. null: bearings are of the site already.",
+        "added to the bearings of its tags, and these tell where a tag starts. null: bearings are of the site already.",
+    )
+    mirrors_behind: StrictBool = Field(
+        default=True,
+        description="Whether this anchor sees a tag behind it at the mirror image ahead, as one with two antennas "
+        "does. false: it tells the two apart, or no tag is ever behind it. It counts with `facing_rad`.",
     )
 
     @property

@@ -29,7 +29,7 @@ from support.zenoh_router import wait_until
 
 FACING = 0.7
 TAGS = ("pty-1", "mqtt", "http")
-SITE = f'[[site.anchors]]\nid = "7"\nfacing_rad = {FACING}\n'
+SITE = f'[[site.anchors]]\nid = "7"\nfacing_rad = {FACING}\nmirrors_behind = false\n'
 RULES = """
 [[rule]]
 topic = "aoa/+"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dropanchor_evaluation.paper.compiled import algorithm1
-from dropanchor_service.estimation.columns import HEADING, RANGE, HeadingSource, SampleBatch, default_settings
+from dropanchor_service.estimation.columns import ANCHOR, HEADING, RANGE, HeadingSource, SampleBatch, default_settings
 from dropanchor_service.estimation.paper.engine import PaperEngine
 from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
 
@@ -24,7 +24,7 @@ def test_the_compiled_algorithm_gives_the_numbers_of_the_engine(parameters: Pape
     compiled = algorithm1(t, heading, ranges, (10.0, 0.0, np.pi / 2), parameters)
 
     engine = PaperEngine(parameters)
-    engine.set_anchors(np.zeros(1, "f8,f8,f8"))
+    engine.set_anchors(np.zeros(1, ANCHOR))
     settings = default_settings()
     settings["start_known"], settings["start_x"], settings["start_y"] = True, 10.0, 0.0
     settings["start_heading"], settings["heading_source"] = np.pi / 2, HeadingSource.PLATFORM

@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 from dropanchor_service.estimation.columns import (
-    ANCHOR,
     BEARING,
     HEADING,
     IMU,
@@ -22,6 +21,7 @@ from dropanchor_service.estimation.columns import (
     Array,
     HeadingSource,
     SampleBatch,
+    anchors_at,
     default_settings,
 )
 from dropanchor_tag_client.simulator.imu import Imu
@@ -62,7 +62,7 @@ def read_batches(name: str) -> Iterator[SampleBatch]:
 
 def anchors_of(scenario: Scenario) -> Array:
     """Return ANCHOR of the scenario."""
-    return np.array([(anchor.x, anchor.y, anchor.z) for anchor in scenario.models.anchors], ANCHOR)
+    return anchors_at(*((anchor.x, anchor.y, anchor.z) for anchor in scenario.models.anchors))
 
 
 def settings_of(scenario: Scenario) -> Array:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dropanchor_service.estimation.columns import IMU, POSE, RANGE, Array, SampleBatch, State, default_settings
+from dropanchor_service.estimation.columns import ANCHOR, IMU, POSE, RANGE, Array, SampleBatch, State, default_settings
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.plausibility.check import SensorCheck
 from dropanchor_tag_client.simulator.sensors import preset
@@ -125,7 +125,7 @@ def verdicts_of(imu: Array, ranges: Array, step_s: float = 1.0, check: SensorChe
 def tracked(imu: Array, ranges: Array, run: Simulation, start_known: bool) -> Checked:
     """Return the poses of the check and the engine, as the service puts them together."""
     engine, check, settings = FleetEngine(), SensorCheck(), default_settings()
-    engine.set_anchors(np.zeros(1, [("x", "f8"), ("y", "f8"), ("z", "f8")]))
+    engine.set_anchors(np.zeros(1, ANCHOR))
     if start_known:
         settings["start_known"], settings["start_std"] = True, 0.1
         settings["start_x"], settings["start_y"] = run.truth.x[0], run.truth.y[0]

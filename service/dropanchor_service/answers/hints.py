@@ -52,6 +52,11 @@ _HINTS = {
     StateReason.ANCHOR_DOUBTED: say(
         "anchor_doubted", "An anchor seems to have moved: say where it is, or save it again to confirm its place."
     ),
+    StateReason.FRONT_OR_BACK: say(
+        "front_or_back",
+        "The tag may be behind the anchor instead: turn left and right once, or set `mirrors_behind` of the anchor to "
+        "false if none is ever behind.",
+    ),
 }
 HINTS = [_HINTS[reason] for reason in StateReason]
 RELATIVE_HINT = say(

@@ -21,7 +21,13 @@ HEADING = np.dtype([("row", "i4"), ("t_ns", "i8"), ("heading", "f8"), ("std", "f
 BEARING = np.dtype([("row", "i4"), ("t_ns", "i8"), ("anchor", "i4"), ("bearing", "f8"), ("std", "f8")])
 PRESSURE = np.dtype([("row", "i4"), ("t_ns", "i8"), ("pressure", "f8"), ("temperature", "f8")])  # Pa, °C
 
-ANCHOR = np.dtype([("x", "f8"), ("y", "f8"), ("z", "f8")])
+ANCHOR = np.dtype(
+    [
+        *((name, "f8") for name in ("x", "y", "z")),
+        ("facing", "f8"),  # rad, NaN: it measures no azimuths, or nobody told it
+        ("mirrors", "?"),  # whether it sees a tag behind it at the mirror image ahead
+    ]
+)
 
 TAG_SETTINGS = np.dtype(
     [
@@ -45,6 +51,8 @@ TAG_SETTINGS = np.dtype(
         ("start_y", "f8"),
         ("start_heading", "f8"),  # NaN: not given
         ("start_std", "f8"),
+        ("start_other_x", "f8"),  # another place where it may start as well, NaN: none
+        ("start_other_y", "f8"),
         ("declination", "f8"),  # true minus magnetic north, positive east
         ("declination_std", "f8"),  # rad
         ("motion", "u1"),
@@ -64,7 +72,7 @@ UNKNOWN = (
     "slip_std",
     "speed_max",
     "heading_std",
-    *(f"start_{name}" for name in ("x", "y", "heading", "std")),
+    *(f"start_{name}" for name in ("x", "y", "heading", "std", "other_x", "other_y")),
 )  # NaN by default
 
 POSE = np.dtype(
@@ -201,6 +209,7 @@ class StateReason(IntEnum):
     HEADING_UNSURE = 11  # the heading may be wrong by a constant, and with it the direction from the anchor
     SENSOR_FAULT = 12  # a sensor failed its check; engines do not give it
     ANCHOR_DOUBTED = 13  # an anchor seems to have moved; engines do not give it
+    FRONT_OR_BACK = 14  # the anchor cannot tell whether the tag is ahead of it or behind it
 
 
 @dataclass(frozen=True)
@@ -305,6 +314,11 @@ class FollowsPressure(Protocol):
 
     def refer(self, row: int, reference: int) -> None:
         """Compare the pressures of `row` with those of the row `reference`, -1: none. Its estimate goes on."""
+
+
+def anchors_at(*places: tuple[float, float, float]) -> Array:
+    """Return ANCHOR of anchors at these places, which measure no azimuths."""
+    return np.array([(*place, np.nan, False) for place in places], ANCHOR)
 
 
 def default_settings() -> Array:

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_schemas.site import Anchor
 from dropanchor_service.estimation.columns import ANCHOR, Array
 from dropanchor_service.settings.engine_columns import anchor_columns
 from dropanchor_service.store import ServedSite
@@ -24,8 +23,8 @@ class Change(NamedTuple):
 class AnchorTable:
     """An index keeps its meaning for the life of the table. Owned by one thread.
 
-    places: ANCHOR, of every anchor that a site has or had. facings: rad, NaN: not told. sites: index of the site of
-    each. With one site, an index is the one that its store gives the anchor.
+    places: ANCHOR, of every anchor that a site has or had. sites: index of the site of each. With one site, an index is
+    the one that its store gives the anchor.
     """
 
     def __init__(self) -> None:
@@ -33,7 +32,6 @@ class AnchorTable:
 
     def _clear(self) -> None:
         self.places = np.zeros(0, ANCHOR)
-        self.facings = np.zeros(0)
         self.sites = np.zeros(0, np.int32)
         self._told: dict[int, int] = {}  # by index of the site: how often somebody has said where an anchor is
         self._indices: dict[int, Array] = {}  # by index of the site: where its anchors are, in the order of its store
@@ -43,17 +41,16 @@ class AnchorTable:
 
     def follow(self, site: ServedSite) -> Change:
         """Take over the anchors of a site. Return what has changed of those that it had."""
-        anchors = site.store.anchors_by_index()
-        places, facings = anchor_columns(anchors), _facings(anchors)
-        known = self._of(site.index)
-        moved = bool((places[: len(known)] != self.places[known]).any())
-        turned = not np.array_equal(facings[: len(known)], self.facings[known], equal_nan=True)
+        places, known = anchor_columns(site.store.anchors_by_index()), self._of(site.index)
+        now, before = places[: len(known)], self.places[known]
+        moved, turned = have_moved(now, before), _have_turned(now, before)
+        turned |= moved & np.isfinite(now["facing"])  # where its azimuths placed a tag is no longer a place of the site
         self._append(np.full(len(places) - len(known), site.index, np.int32))
-        self.places[self._of(site.index)], self.facings[self._of(site.index)] = places, facings
+        self.places[self._of(site.index)] = places
         self._find_by_number(site)
-        before = self._told.get(site.index, 0)
+        told = self._told.get(site.index, 0)
         self._told[site.index] = site.store.anchors_told
-        return Change(moved, turned, before != site.store.anchors_told)
+        return Change(bool(moved.any()), bool(turned.any()), told != site.store.anchors_told)
 
     def of_site(self, site: int) -> list[int]:
         """Return the indices of the anchors that a site has or had."""
@@ -94,7 +91,6 @@ class AnchorTable:
             self._indices[site] = np.concatenate([known, begin + new])
         self.sites = np.concatenate([self.sites, sites])
         self.places = np.concatenate([self.places, np.zeros(len(sites), ANCHOR)])
-        self.facings = np.concatenate([self.facings, np.full(len(sites), np.nan)])
         self._own = np.concatenate([self._own[:-1], own, self._own[-1:]])
 
     def _find_by_number(self, site: ServedSite) -> None:
@@ -108,5 +104,15 @@ class AnchorTable:
         self._of_keys = np.concatenate([self._of_keys[:begin], indices, self._of_keys[end:]])
 
 
-def _facings(anchors: Sequence[Anchor]) -> Array:
-    return np.array([np.nan if anchor.facing_rad is None else anchor.facing_rad for anchor in anchors], np.float64)
+def have_moved(places: Array, before: Array) -> Array:
+    """Return which of these ANCHOR are in other places than before."""
+    moved: Array = np.any([places[axis] != before[axis] for axis in "xyz"], axis=0)
+    return moved
+
+
+def _have_turned(places: Array, before: Array) -> Array:
+    """Return which of these ANCHOR face elsewhere, or see what is behind them in another way."""
+    facing, earlier = places["facing"], before["facing"]
+    same: Array = (facing == earlier) | (np.isnan(facing) & np.isnan(earlier))
+    turned: Array = ~same | (places["mirrors"] != before["mirrors"])
+    return turned

@@ -19,7 +19,7 @@ from dropanchor_service.estimation.columns import (
 from dropanchor_service.estimation.plausibility.check import Checked, SensorCheck
 from dropanchor_service.estimation.plausibility.layout import make_checks
 from dropanchor_service.ingest.anchor_watch import AnchorWatch
-from dropanchor_service.ingest.anchors import AnchorTable
+from dropanchor_service.ingest.anchors import AnchorTable, have_moved
 from dropanchor_service.ingest.configured import Configured
 from dropanchor_service.ingest.decode import Decoded
 from dropanchor_service.ingest.lost_pose import lost_pose
@@ -88,7 +88,7 @@ class GuardedEngine:
         self._sensors.columns = state.pop("checks")
         self._engine.set_anchors(anchors)
         self._engine.restore(state)
-        moved = dict.fromkeys(self.anchors.sites[self.anchors.places != anchors].tolist())
+        moved = dict.fromkeys(self.anchors.sites[have_moved(self.anchors.places, anchors)].tolist())
         afresh = self._move([self._sites[index] for index in moved])
         self._settings = settings
         self._has_units = has_units(settings)
@@ -188,7 +188,7 @@ class GuardedEngine:
             self._configure(row)
         checked = self._sensors.check(samples)
         for row, start in self._measured.look(checked.samples, self.anchors, self._settings["height"]):
-            self._engine.configure(row, self._configured[row].with_start(start).columns())
+            self._engine.configure(row, start.told_to(self._configured[row].columns()))
         usable = with_lasting_errors(checked.samples, self.anchors)
         for batch in self._bisected(usable, now_ns) if any(map(len, usable.columns())) else ():
             self._starts.look(batch)

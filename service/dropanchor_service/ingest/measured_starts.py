@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_schemas.site import StartPose
 from dropanchor_service.estimation.columns import Array, SampleBatch
 from dropanchor_service.ingest.anchors import AnchorTable
 
@@ -17,7 +16,7 @@ LEAST_NS, LONGEST_NS = 500_000_000, 1_500_000_000  # from the first to the last 
 UNKNOWN_STD = math.radians(10.0)
 LEAST_STD_M = 0.3
 LASTING = 17.0  # root of 10 Hz · 30 s, in which the mean of azimuths is to be as unsure as one
-AGREE = 3.0  # standard deviations: azimuths that differ by more are reflections, or from both sides of the antennas
+AGREE = 3.0  # standard deviations: azimuths that differ by more are reflections
 
 
 class _Seen(NamedTuple):
@@ -27,6 +26,21 @@ class _Seen(NamedTuple):
     anchor: int
     value: float
     std: float
+
+
+class MeasuredStart(NamedTuple):
+    """A place where a tag starts, m, and the one where it may start as well: its mirror image behind the anchor."""
+
+    place: tuple[float, float]
+    std_m: float
+    other: tuple[float, float] | None
+
+    def told_to(self, settings: Array) -> Array:
+        """Return TAG_SETTINGS with this start."""
+        settings["start_known"], settings["start_std"] = True, self.std_m
+        settings["start_x"], settings["start_y"] = self.place
+        settings["start_other_x"], settings["start_other_y"] = self.other or (math.nan, math.nan)
+        return settings
 
 
 class MeasuredStarts:
@@ -49,11 +63,11 @@ class MeasuredStarts:
         self._ranges.pop(row, None)
         self._azimuths.pop(row, None)
 
-    def look(self, samples: SampleBatch, anchors: AnchorTable, heights: Array) -> Iterator[tuple[int, StartPose]]:
+    def look(self, samples: SampleBatch, anchors: AnchorTable, heights: Array) -> Iterator[tuple[int, MeasuredStart]]:
         """Yield the rows whose start these samples tell. heights: m, by row."""
         if not self._open or not (len(samples.bearings) or self._azimuths):
             return
-        azimuths = samples.bearings[np.isfinite(anchors.facings[samples.bearings["anchor"]])]
+        azimuths = samples.bearings[np.isfinite(anchors.places["facing"][samples.bearings["anchor"]])]
         measured = set(azimuths["row"].tolist()) & self._open
         self._note(azimuths, "bearing", self._azimuths, measured)
         self._note(samples.ranges, "range", self._ranges, measured | self._azimuths.keys())
@@ -75,7 +89,7 @@ def with_lasting_errors(samples: SampleBatch, anchors: AnchorTable) -> SampleBat
 
     The engine takes errors for independent: of a hundred azimuths it would believe the mean to a tenth of their error.
     """
-    are_azimuths = np.isfinite(anchors.facings[samples.bearings["anchor"]])
+    are_azimuths = np.isfinite(anchors.places["facing"][samples.bearings["anchor"]])
     if not are_azimuths.any():
         return samples
     bearings = samples.bearings.copy()
@@ -84,7 +98,7 @@ def with_lasting_errors(samples: SampleBatch, anchors: AnchorTable) -> SampleBat
     return replace(samples, bearings=bearings)
 
 
-def _start(ranges: list[_Seen], azimuths: list[_Seen], anchors: Array, height: float) -> StartPose | None:
+def _start(ranges: list[_Seen], azimuths: list[_Seen], anchors: Array, height: float) -> MeasuredStart | None:
     """Return the place that ranges to and azimuths from one anchor agree on, None where they are too few or differ.
 
     The errors of azimuths last, so their mean is no better than one of them.
@@ -102,8 +116,11 @@ def _start(ranges: list[_Seen], azimuths: list[_Seen], anchors: Array, height: f
     place = anchors[anchor]
     slant = float(np.median([one.value for one in far]))
     level = math.sqrt(max(slant**2 - (height - float(place["z"])) ** 2, 0.0))
-    return StartPose(
-        x=float(place["x"]) + level * math.cos(middle),
-        y=float(place["y"]) + level * math.sin(middle),
-        std_m=max(LEAST_STD_M, slant * max(told, spread)),
+
+    def seen(azimuth: float) -> tuple[float, float]:
+        return float(place["x"]) + level * math.cos(azimuth), float(place["y"]) + level * math.sin(azimuth)
+
+    behind = 2.0 * float(place["facing"]) + math.pi - middle
+    return MeasuredStart(
+        seen(middle), max(LEAST_STD_M, slant * max(told, spread)), seen(behind) if place["mirrors"] else None
     )

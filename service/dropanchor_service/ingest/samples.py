@@ -285,7 +285,7 @@ class SampleReader:
             indices = indices[~unknown]
         samples["anchor"] = indices
         if kind.sample is BearingSample:
-            samples["value"] += np.nan_to_num(self._engine.anchors.facings[indices])
+            samples["value"] += np.nan_to_num(self._engine.anchors.places["facing"][indices])
         return samples
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_service.estimation.columns import (
-    ANCHOR,
     HEADING,
     IMU,
     POSE,
@@ -19,6 +18,7 @@ from dropanchor_service.estimation.columns import (
     Array,
     Engine,
     SampleBatch,
+    anchors_at,
 )
 from dropanchor_service.estimation.fleet.smoother.smoothed import smoothed_poses
 from dropanchor_service.estimation.fleet.smoother.trace import TracingEngine
@@ -70,7 +70,7 @@ class Samples:
 
 def anchors_of(recording: Recording) -> Array:
     """Return ANCHOR rows in the order of the recording's anchors."""
-    return np.array([(anchor.x, anchor.y, anchor.z) for anchor in recording.anchors], ANCHOR)
+    return anchors_at(*((anchor.x, anchor.y, anchor.z) for anchor in recording.anchors))
 
 
 def truth_of(recording: Recording) -> Truth | None:

@@ -3,10 +3,15 @@
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from dropanchor_schemas.site import Anchor, TagSettings
-from dropanchor_service.estimation.columns import ANCHOR, Array, HeadingSource, HeightMotion, Motion, default_settings
+from dropanchor_service.estimation.columns import (
+    Array,
+    HeadingSource,
+    HeightMotion,
+    Motion,
+    anchors_at,
+    default_settings,
+)
 
 ACC_UNITS = {"m/s2": 1.0, "g": 9.80665, "mg": 0.00980665}
 GYRO_UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
@@ -15,7 +20,10 @@ RANGE_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
 
 def anchor_columns(anchors: Sequence[Anchor]) -> Array:
     """Return one ANCHOR per anchor, in order."""
-    return np.array([(anchor.x, anchor.y, anchor.z) for anchor in anchors], ANCHOR)
+    columns = anchors_at(*((anchor.x, anchor.y, anchor.z) for anchor in anchors))
+    columns["facing"] = [_or_nan(anchor.facing_rad) for anchor in anchors]
+    columns["mirrors"] = [anchor.facing_rad is not None and anchor.mirrors_behind for anchor in anchors]
+    return columns
 
 
 def tag_columns(tag: TagSettings, declination_rad: float, declination_std_rad: float | None = None) -> Array:

@@ -8,7 +8,6 @@ from typing import Any, Literal
 import numpy as np
 
 from dropanchor_service.estimation.columns import (
-    ANCHOR,
     HEADING,
     IMU,
     POSE,
@@ -18,6 +17,7 @@ from dropanchor_service.estimation.columns import (
     Engine,
     HeadingSource,
     SampleBatch,
+    anchors_at,
     default_settings,
 )
 from dropanchor_service.offline.accuracy import Truth
@@ -81,7 +81,7 @@ def run_engine(engine: Engine, simulations: Sequence[Simulation], known: PriorKn
 
 def configure(engine: Engine, simulations: Sequence[Simulation], known: PriorKnowledge) -> None:
     """Set the anchors of a fresh engine, and make run i its row i. All runs must have the same anchors."""
-    engine.set_anchors(np.array([(a.x, a.y, a.z) for a in simulations[0].anchors], ANCHOR))
+    engine.set_anchors(anchors_at(*((a.x, a.y, a.z) for a in simulations[0].anchors)))
     for row, simulation in enumerate(simulations):
         engine.configure(row, _settings(simulation, known))
 

@@ -80,7 +80,7 @@ def test_each_value_comes_with_its_source_and_what_it_hides(
     monkeypatch.setenv(f"DROPANCHOR_{below}SITE__NAME", "Env")
     before = {path: path.read_bytes() for path in (tmp_path / "data").rglob("*") if path.is_file()}
     found = shown(capsys, [*words, "--port", "8083"])
-    one = {"id": "1", "x": 0.0, "y": 0.0, "z": 2.5, "facing_rad": None}
+    one = {"id": "1", "x": 0.0, "y": 0.0, "z": 2.5, "facing_rad": None, "mirrors_behind": True}
     assert found[None, "http", "port"] == (8083, "command_line", [(8082, "file"), (8080, "default")])
     assert found[None, "ingest", "period_ms"] == (20.0, "default", [])
     assert found["yard", "site", "name"] == ("Hof", "rest", [("Env", "environment"), ("Yard", "file"), ("", "default")])

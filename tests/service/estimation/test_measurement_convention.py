@@ -6,13 +6,21 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.columns import ANCHOR, HEADING, RANGE, Array, Engine, SampleBatch, default_settings
+from dropanchor_service.estimation.columns import (
+    HEADING,
+    RANGE,
+    Array,
+    Engine,
+    SampleBatch,
+    anchors_at,
+    default_settings,
+)
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.paper.engine import PaperEngine
 from dropanchor_service.estimation.paper.parameters import TUNED
 
 SCALE, BIAS, RANGE_STD = 1.069, 0.3, 0.1
-ANCHORS = np.array([(0.0, 0.0, 0.0), (4.0, 3.0, 2.0)], ANCHOR)
+ANCHORS = anchors_at((0.0, 0.0, 0.0), (4.0, 3.0, 2.0))
 START = (10.0, 0.0, 1.2)
 ENGINES: dict[str, Callable[[], Engine]] = {"fleet": FleetEngine, "paper": lambda: PaperEngine(TUNED)}
 
@@ -30,7 +38,7 @@ def innovations(engine: Engine, anchor: int) -> Array:
     headings, ranges = np.zeros(len(t_ns), HEADING), np.zeros(len(t_ns) - 1, RANGE)
     headings["t_ns"], headings["std"] = t_ns, 0.05
     ranges["t_ns"], ranges["anchor"], ranges["std"] = t_ns[1:], [0] + [anchor] * (len(t_ns) - 2), math.nan
-    distances = [math.dist(START, ANCHORS[index].tolist()) for index in ranges["anchor"]]
+    distances = [math.dist(START, ANCHORS[index].tolist()[:3]) for index in ranges["anchor"]]
     ranges["range"] = SCALE * np.array(distances) + BIAS
     return engine.process(SampleBatch(headings=headings, ranges=ranges)).innovations
 

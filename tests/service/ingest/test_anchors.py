@@ -16,7 +16,7 @@ def test_the_first_anchor_becomes_the_origin_and_others_are_unknown() -> None:
     bench.send("a", ranges(1.0, anchor=7), ranges(2.0, anchor=8), ranges(3.0, anchor=7))
     assert bench.site.site.anchors == [Anchor(id="7")]
     assert bench.engine.anchors is not None
-    assert bench.engine.anchors.tolist() == [(0.0, 0.0, 0.0)]
+    assert bench.engine.anchors[["x", "y", "z"]].tolist() == [(0.0, 0.0, 0.0)]
     assert bench.rejected() == {"anchor_unknown": 1}
     assert bench.x_of("a") == [3.0]
 

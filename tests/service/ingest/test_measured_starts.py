@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dropanchor_schemas.wire import BearingSample, Frame, RangeSample
-from dropanchor_service.estimation.columns import POSE, Array, State
+from dropanchor_service.estimation.columns import POSE, Array, State, StateReason
 from dropanchor_service.estimation.columns import Frame as PoseFrame
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_tag_client.simulator.azimuth import AzimuthModel
@@ -49,13 +49,14 @@ class Run(NamedTuple):
         return int((squared > sigmas**2).sum())
 
 
-def bench_of(facing: float | None, **options: Any) -> IngestBench:
-    return IngestBench(site={"id": "default", "anchors": [{"id": "1", "facing_rad": facing}]}, **options)
+def bench_of(facing: float | None, mirrors: bool = False, **options: Any) -> IngestBench:
+    anchor = {"id": "1", "facing_rad": facing, "mirrors_behind": mirrors}
+    return IngestBench(site={"id": "default", "anchors": [anchor]}, **options)
 
 
-def run_of(scenario: str, seed: int, azimuths: AzimuthModel, seconds: float) -> Run:
+def run_of(scenario: str, seed: int, azimuths: AzimuthModel, seconds: float, mirrors: bool = False) -> Run:
     """Return the poses of a simulated tag of which nothing is told, after each message of 0.2 s."""
-    bench, poses = bench_of(FACING, engine=FleetEngine()), []
+    bench, poses = bench_of(azimuths.facing, mirrors, engine=FleetEngine()), []
     models = replace(preset("calibrated", range_hz=10.0, imu_hz=100.0), azimuth=azimuths)
     for part in deliveries(1, scenario, seed, models, T0_NS, step_s=0.2):
         if part.due_s > seconds:
@@ -82,6 +83,25 @@ def test_a_tag_of_which_nothing_is_told_is_where_range_and_azimuth_say_within_se
     assert run.beyond(5.0) == 0
 
 
+@pytest.mark.parametrize("seed", range(48_710, 48_714))
+@pytest.mark.parametrize("scenario", ["M5", "OU", "forklift"])
+@pytest.mark.parametrize("facing", [FACING, FACING + math.pi], ids=["ahead", "behind"])
+def test_a_tag_that_may_be_behind_two_antennas_is_ambiguous_until_its_motion_tells(
+    facing: float, scenario: str, seed: int
+) -> None:
+    run = run_of(scenario, seed, AzimuthModel(FIVE, facing=facing, is_folded=True), 40.0, mirrors=True)
+    begun = run.poses["state"] != State.INITIALISING
+    first = run.poses[begun & (run.t_s < 3.0)]
+    assert set(first["state"]) == {State.AMBIGUOUS}
+    assert StateReason.FRONT_OR_BACK in first["reason"]
+    assert run.beyond(5.0) == 0
+
+
+def test_the_motion_of_most_tags_tells_within_a_minute_on_which_side_of_two_antennas_they_are() -> None:
+    runs = [run_of("OU", seed, AzimuthModel(FIVE, facing=math.pi, is_folded=True), 60.0, True) for seed in range(4)]
+    assert sum(bool(run.is_tracking[-1]) for run in runs) >= 3
+
+
 @pytest.mark.parametrize("lasting", [5.0, 10.0])
 @pytest.mark.parametrize("scenario", ["M5", "OU"])
 def test_errors_that_last_do_not_average_out(scenario: str, lasting: float) -> None:
@@ -100,13 +120,13 @@ def message(begin: int, azimuths: list[float], std_rad: float = FIVE) -> Frame:
     )
 
 
-def starts_of(bench: IngestBench, *messages: Frame) -> list[tuple[float, float]]:
+def starts_of(bench: IngestBench, *messages: Frame, name: str = "start") -> list[tuple[float, float]]:
     """Return the known starts with which the row of the tag was configured, when these messages have come."""
     for one in messages:
         bench.put("a", one, at_ns=one.ranges[-1].t_ns)
         bench.ingest.turn()
     configured = bench.engine.configured[0]
-    return [(float(one["start_x"]), float(one["start_y"])) for one in configured if one["start_known"]]
+    return [(float(one[f"{name}_x"]), float(one[f"{name}_y"])) for one in configured if one["start_known"]]
 
 
 AHEAD = [0.0] * 8
@@ -120,6 +140,14 @@ def test_the_start_is_where_the_anchor_faces_and_is_as_unsure_as_one_azimuth() -
     fused = bench.engine.batches[-1].bearings
     assert fused["bearing"] == pytest.approx(math.pi / 2)
     assert (fused["std"] > 10.0 * FIVE).all()
+
+
+@pytest.mark.parametrize(
+    ("azimuth", "place"), [(0.0, (0.0, -10.0)), (0.3, (-10.0 * math.sin(0.3), -10.0 * math.cos(0.3)))]
+)
+def test_an_anchor_that_mirrors_tells_the_place_behind_it_as_well(azimuth: float, place: tuple[float, float]) -> None:
+    (other,) = starts_of(bench_of(math.pi / 2, mirrors=True), message(0, [azimuth] * 8), name="start_other")
+    assert other == pytest.approx(place, abs=1e-6)
 
 
 def test_azimuths_that_do_not_say_how_sure_they_are_last_too() -> None:

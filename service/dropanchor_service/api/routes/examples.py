@@ -99,7 +99,10 @@ POSE_FRAME: dict[str, Any] = {
     "online": [True, True],
     "state": ["tracking", "initialising"],
     "reason": ["resolved", "no_heading"],
-    "hint": ["", "There is no heading yet: the tag must send IMU samples or a platform heading."],
+    "hint": [
+        "",
+        "There is no heading yet: the tag must send IMU samples or a platform heading.",
+    ],
     "frame": ["site", "site"],
     "relative_pose": [None, None],
     "anchor": ["1", "1"],

@@ -44,7 +44,7 @@ def configure_row(columns: Array, tuning: Tuning) -> Array:
     settings["reference_std"] = math.hypot(REFERENCE_STD, columns["declination_std"])
     settings["gyro_bias_std"] = BIAS_LEFT
     settings["speed_max"] = _positive(columns["speed_max"], SPEED_MAX)
-    for name in ("known", "x", "y", "heading"):
+    for name in ("known", "x", "y", "heading", "other_x", "other_y"):
         start[name] = columns[f"start_{name}"]
     start["std"] = _positive(columns["start_std"], START_STD)
     start["heading_std"] = START_HEADING_STD

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from dropanchor_service.estimation.columns import (
-    ANCHOR,
     INNOVATION,
     POSE,
     Array,
@@ -46,7 +45,7 @@ class PaperEngine:
 
     def set_anchors(self, anchors: Array) -> None:
         """Set ANCHOR, which the `anchor` columns of samples index."""
-        self._anchors = anchors.astype(ANCHOR).tolist()
+        self._anchors = anchors[["x", "y", "z"]].tolist()
 
     def configure(self, row: int, settings: Array) -> None:
         """Make `row` with these TAG_SETTINGS (0-d), or start it again with new ones."""

@@ -28,6 +28,8 @@ class Tag:
     def of(cls, settings: Array) -> "Tag":
         """Return the tag with these TAG_SETTINGS (0-d)."""
         values = {name: settings[name].item() for name in cls.__dataclass_fields__}
+        if math.isfinite(settings["start_other_x"]):
+            values["start_known"] = False  # the paper has no hypotheses of two places
         if not math.isfinite(values["mount_angle"]):
             values["mount_angle"] = 0.0
         return cls(**values)

@@ -12,7 +12,7 @@ from dropanchor_evaluation.product.rows import BARE, CARRIED, FAST, Row
 from dropanchor_evaluation.recordings import settings_of
 from dropanchor_evaluation.simulated import START_STD, Feed, samples_of
 from dropanchor_evaluation.simulated import truth_of as simulated_truth
-from dropanchor_service.estimation.columns import ANCHOR, Array, HeadingSource, SampleBatch, default_settings
+from dropanchor_service.estimation.columns import Array, HeadingSource, SampleBatch, anchors_at, default_settings
 from dropanchor_service.offline.accuracy import Truth
 from dropanchor_service.offline.replay import NS_PER_S, anchors_of, truth_of
 from dropanchor_service.offline.replay import samples_of as recorded_samples
@@ -107,7 +107,7 @@ def _of_simulation(row: Row, run: Simulation) -> TagRun:
         samples=samples,
         settings=_settings(row, run),
         truth=simulated_truth(run),
-        anchors=np.array([(a.x, a.y, a.z) for a in run.anchors], ANCHOR),
+        anchors=anchors_at(*((a.x, a.y, a.z) for a in run.anchors)),
         no_north=feed == "raw 6-axis" and row.start == "unknown",
     )
 

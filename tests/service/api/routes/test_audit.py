@@ -147,8 +147,8 @@ def test_an_entry_says_who_did_what_and_when_and_what_was_before(audited: Audite
             "by": {"source": "key", "name": "write"},
             "kind": "anchor",
             "item": "17",
-            "before": {"id": "17", "x": 0.0, "y": 0.0, "z": 0.0, "facing_rad": None},
-            "after": {"id": "17", "x": 50.0, "y": 0.0, "z": 0.0, "facing_rad": None},
+            "before": {"id": "17", "x": 0.0, "y": 0.0, "z": 0.0, "facing_rad": None, "mirrors_behind": True},
+            "after": {"id": "17", "x": 50.0, "y": 0.0, "z": 0.0, "facing_rad": None, "mirrors_behind": True},
             "confirmed": True,
         }
     ]

@@ -7,7 +7,7 @@ import numpy as np
 
 from dropanchor_evaluation.simulated import batches, merged, samples_of
 from dropanchor_schemas.site import StartPose, TagSettings
-from dropanchor_service.estimation.columns import ANCHOR, Array
+from dropanchor_service.estimation.columns import Array, anchors_at
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.settings.engine_columns import tag_columns
 from dropanchor_tag_client.simulator.sensors import preset
@@ -27,7 +27,7 @@ def rooms(tags: int) -> list[Simulation]:
 def engine_for(runs: list[Simulation], place: bool = True, heading: bool = True) -> FleetEngine:
     """Return an engine for tags whose place, and whose heading there, are told or not."""
     engine = FleetEngine()
-    engine.set_anchors(np.array([(a.x, a.y, a.z) for a in runs[0].anchors], ANCHOR))
+    engine.set_anchors(anchors_at(*((a.x, a.y, a.z) for a in runs[0].anchors)))
     for row, run in enumerate(runs):
         truth = run.truth
         yaw = math.remainder(truth.heading[0], math.tau) if heading else None

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.columns import ANCHOR, Array, SampleBatch, State
+from dropanchor_service.estimation.columns import Array, SampleBatch, State, anchors_at
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from support.fleet_runs import cut, engine, error_of, samples, settings
 from support.fleet_tracks import CALIBRATED
@@ -17,7 +17,7 @@ FAR: Place = (10.0, 40.0, 0.0)
 
 
 def places(*anchors: Place) -> Array:
-    return np.array(list(anchors), ANCHOR)
+    return anchors_at(*anchors)
 
 
 def halves(batch: SampleBatch) -> tuple[SampleBatch, SampleBatch]:

@@ -4,13 +4,12 @@ import math
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import (
-    ANCHOR,
     HeadingSource,
     SampleBatch,
+    anchors_at,
 )
 from dropanchor_service.estimation.paper.engine import PaperEngine
 from dropanchor_service.estimation.paper.parameters import TUNED
@@ -74,7 +73,7 @@ def test_an_attitude_is_fused_once_however_many_ranges_come_before_the_next() ->
 
 def test_height_bias_and_scale_of_the_range_are_taken_out() -> None:
     made = PaperEngine(TUNED)
-    made.set_anchors(np.array([(1.0, 2.0, 5.0)], ANCHOR))
+    made.set_anchors(anchors_at((1.0, 2.0, 5.0)))
     made.configure(0, start(height=1.0, range_scale=1.05, range_bias=0.3, start_std=5.0))
     made.process(headings((0, 0.0)))
     true = math.sqrt(9.0**2 + 2.0**2 + 4.0**2)

@@ -159,7 +159,7 @@ def restart_from_gap(row: Row, anchor: Anchor, t: Tuning) -> None:
     gap, start = row.gap, row.start
     known, std = is_on(AFTER_GAP, t) and _is_position_known(row), math.sqrt(_position_variance(row))
     forget(row, GAP)
-    start.heading = math.nan
+    start.heading = start.other_x = math.nan
     start.coarse, row.publication.state = 1, INITIALISING
     if known:
         start.after_gap = 1

@@ -78,6 +78,8 @@ START: Final = np.dtype(
         ("heading", np.float64),  # rad, body yaw; NaN: unknown
         ("heading_std", np.float64),
         ("speed_std", np.float64),  # m/s
+        ("other_x", np.float64),  # m, where it may start as well; NaN: nowhere, or one place is left
+        ("other_y", np.float64),
         ("after_gap", np.uint8),  # 1: the start is where the tag was before a gap
         ("coarse", np.uint8),  # 1: it begins again after a gap, with few and wide hypotheses until one is resolved
         ("range_count", np.int32),

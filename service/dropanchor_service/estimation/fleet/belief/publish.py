@@ -3,6 +3,7 @@
 import math
 from typing import Final
 
+from dropanchor_service.estimation.fleet.belief.births.mirrored import is_mirrored
 from dropanchor_service.estimation.fleet.belief.births.sight import MISFIT_LIMIT
 from dropanchor_service.estimation.fleet.belief.layout import Anchors, Belief, Floats, Hypotheses, Row, Scratch
 from dropanchor_service.estimation.fleet.belief.observability import predict_information, sigma_obs
@@ -13,6 +14,7 @@ from dropanchor_service.estimation.fleet.belief.states import (
     AMBIGUOUS,
     COASTING,
     DEGRADED,
+    FRONT_OR_BACK,
     HEADING_UNSURE,
     IMU_MISSING,
     LOST,
@@ -35,6 +37,7 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 
 DOMINANT: Final = 0.9  # weight of a mode above which the others hardly matter
 DOMINANT_AGAIN: Final = 0.95  # the same, of a row that is ambiguous: it does not flicker
+MIRRORED_S: Final = 8.0  # s for which one of two places ahead of an anchor and behind it has to hold that weight
 UNRESOLVED_S: Final = 1.0  # s without a dominant mode after which one has to explain all ranges anew
 RERESOLVE_AFTER: Final = 3.0  # s without a range after which one mode has to explain the ranges anew
 COASTING_AFTER, RANGES_LOST_AFTER = 1.5, 30.0  # s without a range
@@ -111,8 +114,9 @@ def _update_resolved(row: Row, node: Node, p_mode: float, relative: float, r: fl
     publication.resolved_s = publication.resolved_s + node.dt_s if resolved else 0.0
     publication.unresolved_s = 0.0 if p_mode > DOMINANT else publication.unresolved_s + node.dt_s
     at_given_start = start.known == 1 and start.after_gap == 0 and publication.resolved == 0 and resolved
-    if publication.resolved_s >= t.resolved_s or at_given_start:
-        publication.resolved, start.coarse = 1, 0
+    mirrored = is_mirrored(row)
+    if publication.resolved_s >= (MIRRORED_S if mirrored else t.resolved_s) or (at_given_start and not mirrored):
+        publication.resolved, start.coarse, start.other_x = 1, 0, math.nan
     if publication.unresolved_s > UNRESOLVED_S:
         publication.resolved = 0
     if row.since_range_s > RERESOLVE_AFTER:
@@ -123,7 +127,7 @@ def _update_resolved(row: Row, node: Node, p_mode: float, relative: float, r: fl
 def _has_rivals(row: Row, p_mode: float) -> bool:
     """Return whether another mode than the published one may be the right one."""
     publication = row.publication
-    doubted = publication.state == AMBIGUOUS and publication.reason == SEVERAL_MODES
+    doubted = publication.state == AMBIGUOUS and publication.reason in (SEVERAL_MODES, FRONT_OR_BACK)
     return bool(publication.resolved == 0 or p_mode < (DOMINANT_AGAIN if doubted else DOMINANT))
 
 
@@ -140,7 +144,7 @@ def _set_state(row: Row, rivals: bool, undecided: bool, relative: float, sigma: 
     elif row.since_range_s > COASTING_AFTER and (publication.resolved == 1 or publication.state == COASTING):
         publication.state, publication.reason = COASTING, RANGES_MISSING
     elif rivals:
-        publication.state, publication.reason = AMBIGUOUS, SEVERAL_MODES
+        publication.state, publication.reason = AMBIGUOUS, FRONT_OR_BACK if is_mirrored(row) else SEVERAL_MODES
     elif sigma > max(LARGE_M, LARGE_SHARE * r):
         # A mode that is small without the rotation about the anchor lacks only the heading.
         publication.state, publication.reason = AMBIGUOUS, HEADING_UNSURE if _is_small(relative, r) else UNCERTAIN

@@ -16,10 +16,20 @@ BEARING_OUTLIER: Final = 0.05  # probability that a bearing says nothing
 
 @njit(nogil=True)
 def update_bearing(
-    s: Floats, P: Floats, H: Floats, PH: Floats, ox: float, oy: float, z: float, variance: float, out: Floats
+    s: Floats,
+    P: Floats,
+    H: Floats,
+    PH: Floats,
+    ox: float,
+    oy: float,
+    z: float,
+    mirrored: float,
+    variance: float,
+    out: Floats,
 ) -> float:
     """Update with the azimuth z, rad, of the tag seen from an anchor at (ox, oy) from the primary one.
 
+    mirrored: the azimuth, rad, that looks the same to the anchor, NaN: none. The one nearer to the hypothesis counts.
     An outlier may have any azimuth. out receives (innovation, S, probability of an outlier). Return the log likelihood.
     """
     H[:] = 0.0
@@ -28,7 +38,10 @@ def update_bearing(
     d2 = max(dx * dx + dy * dy, 1e-6)
     H[R] = (dx * sn - dy * c) / d2
     H[PHI] = s[R] * (dx * c + dy * sn) / d2
-    e = wrap(z - math.atan2(dy, dx))
+    there = math.atan2(dy, dx)
+    e, other = wrap(z - there), wrap(mirrored - there)
+    if abs(other) < abs(e):
+        e = other
     S = project(P, H, PH) + variance
     inside = (1.0 - BEARING_OUTLIER) * gaussian(e, S)
     beta = inside / (inside + BEARING_OUTLIER / TWO_PI)
@@ -46,10 +59,11 @@ def update_with_bearing(
     """Update every hypothesis with the node's bearing."""
     anchor, primary, out = anchors[node.anchor], anchors[row.anchor], scratch.out
     ox, oy, variance = anchor.x - primary.x, anchor.y - primary.y, node.z_std**2
+    mirrored = 2.0 * anchor.facing + math.pi - node.z if anchor.mirrors else math.nan
     best = best_of(work, count)
     for h in range(count):
         s, P = work[h].mean, work[h].cov
-        likelihood = update_bearing(s, P, scratch.H, scratch.PH, ox, oy, node.z, variance, out)
+        likelihood = update_bearing(s, P, scratch.H, scratch.PH, ox, oy, node.z, mirrored, variance, out)
         work[h].log_weight += t.likelihood_power * likelihood
         if h == best:
             record_innovation(belief, out[0], out[1], out[2])

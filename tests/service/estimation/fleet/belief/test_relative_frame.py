@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dropanchor_evaluation.product.scores import rotated_onto
-from dropanchor_service.estimation.columns import ANCHOR, State
+from dropanchor_service.estimation.columns import State, anchors_at
 from dropanchor_service.estimation.fleet.belief.layout import BELIEF
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.estimation.fleet.belief.step import advance
@@ -30,7 +30,7 @@ def without_north(seed: int, legs: int = 6) -> Drive:
 def run(d: Drive, mount_std: float = 0.0) -> Any:
     rows = rows_of(1, known=False)
     rows["settings"]["mount_angle_std"] = mount_std
-    anchors = np.array([(0.0, 0.0, 0.0), (*SECOND, 0.0)], ANCHOR)
+    anchors = anchors_at((0.0, 0.0, 0.0), (*SECOND, 0.0))
     beliefs = np.zeros(len(d.nodes), BELIEF)
     assert advance(rows, make_pool(512), d.nodes, anchors, CALIBRATED.record(), make_workspace(), beliefs) == 0
     return beliefs

@@ -5,6 +5,7 @@ from dropanchor_service.estimation.fleet.belief.births.direction import follow_r
 from dropanchor_service.estimation.fleet.belief.births.first import collect_start
 from dropanchor_service.estimation.fleet.belief.births.forgetting import MODE, RUNS, forget
 from dropanchor_service.estimation.fleet.belief.births.loop import bear
+from dropanchor_service.estimation.fleet.belief.births.mirrored import start_at_both
 from dropanchor_service.estimation.fleet.belief.births.numbers import (
     ALIGNED,
     DEVICE_TURN,
@@ -42,6 +43,7 @@ def at_start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: Tuning
         count = bear(MOUNT_CELLS, MOUNT_CELLS, work, count, row, node, t, scratch)
         if node.carried == 1:
             count = start_carried(work, count, row, node, t)
+        count = start_at_both(work, count, row, t)
     return count
 
 

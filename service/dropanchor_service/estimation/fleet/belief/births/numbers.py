@@ -29,7 +29,8 @@ OWN_ERROR_AGAIN: Final = 20
 RING_AGAIN: Final = 21
 WALKED_OFF: Final = 22
 AFTER_GAP: Final = 23
-BIRTHS: Final = 24
+MIRRORED_START: Final = 24
+BIRTHS: Final = 25
 
 ALL: Final = (1 << BIRTHS) - 1  # all of them on
 
