@@ -19,7 +19,8 @@ _MOVE_HINT = say("several_modes", "Walk a few metres, but not straight towards t
 _HINTS = {
     StateReason.NO_RANGE: say("no_range", "Too few ranges have arrived: is the anchor on, and is the tag in range?"),
     StateReason.NO_HEADING: say(
-        "no_heading", "There is no heading yet: the tag must send IMU samples or a platform heading."
+        "no_heading",
+        "There is no heading yet: the tag must send IMU samples or a platform heading, or range to three anchors.",
     ),
     StateReason.START_UNKNOWN: say(
         "start_unknown", "Set where the tag starts (`start` in its settings), or use the engine fleet."

@@ -19,7 +19,7 @@ from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from support.golden_checkpoint import Drive, golden, halves
 
 EARLIER = f"{layouts.VERSION - 1}-{'0' * 16}"
-LAYOUT = "9-7132fa4c537efe23"
+LAYOUT = "9-62063ac2e4d63924"
 READ = range(layouts.VERSION - layouts.READ_BEFORE, layouts.VERSION)
 
 

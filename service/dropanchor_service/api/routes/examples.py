@@ -101,7 +101,7 @@ POSE_FRAME: dict[str, Any] = {
     "reason": ["resolved", "no_heading"],
     "hint": [
         "",
-        "There is no heading yet: the tag must send IMU samples or a platform heading.",
+        "There is no heading yet: the tag must send IMU samples or a platform heading, or range to three anchors.",
     ],
     "frame": ["site", "site"],
     "relative_pose": [None, None],

@@ -62,7 +62,7 @@ export default {
   "word.bearing": "Peilung",
   "word.pressure": "Luftdruck",
   "say.no_range": "Zu wenige Distanzen sind angekommen: Ist der Anker eingeschaltet und das Tag in Reichweite?",
-  "say.no_heading": "Es gibt noch keine Richtung: Das Tag muss IMU-Messwerte oder die Richtung einer Plattform senden.",
+  "say.no_heading": "Es gibt noch keine Richtung: Das Tag muss IMU-Messwerte oder die Richtung einer Plattform senden, oder Distanzen zu drei Ankern.",
   "say.start_unknown": "Legen Sie fest, wo das Tag startet (`start` in seinen Einstellungen), oder verwenden Sie die Engine fleet.",
   "say.several_modes": "Gehen Sie ein paar Meter, aber nicht gerade auf den Anker zu oder von ihm weg.",
   "say.ranges_missing": "Es kommen keine Distanzen mehr an: Ist der Anker eingeschaltet und das Tag in Reichweite?",

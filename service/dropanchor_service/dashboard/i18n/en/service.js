@@ -62,7 +62,7 @@ export default {
   "word.bearing": "bearing",
   "word.pressure": "pressure",
   "say.no_range": "Too few ranges have arrived: is the anchor on, and is the tag in range?",
-  "say.no_heading": "There is no heading yet: the tag must send IMU samples or a platform heading.",
+  "say.no_heading": "There is no heading yet: the tag must send IMU samples or a platform heading, or range to three anchors.",
   "say.start_unknown": "Set where the tag starts (`start` in its settings), or use the engine fleet.",
   "say.several_modes": "Walk a few metres, but not straight towards the anchor or away from it.",
   "say.ranges_missing": "No more ranges arrive: is the anchor on, and is the tag in range?",

@@ -29,6 +29,7 @@ PACKED: Final = N * (N + 1) // 2  # entries of the upper triangle of a covarianc
 WORKING_HYPOTHESES: Final = 320  # at most, of one row while it is being worked on
 MAX_HYPOTHESES: Final = 192  # at most, of one row between batches
 START_RANGES: Final = 15  # of which the median gives the distance of an unknown start
+FIX_SLOTS: Final = 4  # anchors whose ranges tell a place at once
 NOISE_LEVELS: Final = 6  # of errors of ranges that last
 STUCK_SLOTS: Final = 4  # anchors of a row whose last ranges are kept; those of equal remainder share a slot
 
@@ -86,6 +87,12 @@ START: Final = np.dtype(
         ("ranges", np.float64, (START_RANGES,)),  # m, the last ones as distances
         ("collected_s", np.float64),  # s over which they were collected
         ("way", np.float64),  # m, driven since the start
+        ("free", np.uint8),  # 1: it started where ranges to three anchors say, without any heading
+        ("fix_run", np.uint8),  # how many of these ranges in a row contradict each other or the track
+        ("contradicted_ns", np.int64),  # when a long run of them last contradicted each other; 0: never
+        ("fix_anchor", np.int32, (FIX_SLOTS,)),  # the last range to each of the last anchors, and when it came
+        ("fix_z", np.float64, (FIX_SLOTS,)),  # m
+        ("fix_t_ns", np.int64, (FIX_SLOTS,)),  # 0: none
     ]
 )
 

@@ -244,8 +244,9 @@ def add_process_noise(
     dt, bias_var = node.dt_s, row.settings.range_bias_std**2
     known = max(0.0, 1.0 - P[RANGE_BIAS, RANGE_BIAS] / bias_var) if bias_var > 0.0 else 0.0
     q_position = t.q_position if node.carried == 0 else t.walk_position_q
-    P[R, R] += q_position * dt
-    P[PHI, PHI] += q_position * dt / max(s[R], 0.1) ** 2
+    moved_var = q_position * dt + node.wander_var
+    P[R, R] += moved_var
+    P[PHI, PHI] += moved_var / max(s[R], 0.1) ** 2
     for i in range(2, N):
         P[i, i] += growth[i] if i != RANGE_BIAS else growth[i] * known
     if not math.isfinite(node.dv_var) and node.carried == 0:

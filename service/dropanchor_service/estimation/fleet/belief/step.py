@@ -2,6 +2,7 @@
 
 from dropanchor_service.estimation.fleet.belief.births.carrying import was_walked_off
 from dropanchor_service.estimation.fleet.belief.births.first import restart_on_ring
+from dropanchor_service.estimation.fleet.belief.births.fix import is_fixed_anew
 from dropanchor_service.estimation.fleet.belief.births.forgetting import GAP, NOISE, PLACE, TRACK, forget
 from dropanchor_service.estimation.fleet.belief.births.moments import (
     after_prediction,
@@ -219,7 +220,11 @@ def _advance_row(
     """Take one node into the row. Return the count of hypotheses."""
     if count > 0:
         accumulate_gap(work, count, row, node)
-    if count > 0 and (is_track_lost(row, node) or was_walked_off(row, node, t)):
+    if count > 0 and (
+        is_track_lost(row, node)
+        or was_walked_off(row, node, t)
+        or is_fixed_anew(work[best_of(work, count)], row, node, anchors)
+    ):
         release(row, pool, scratch.lane)
         forget(row, TRACK)
         count = 0

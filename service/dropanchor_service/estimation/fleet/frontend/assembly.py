@@ -10,7 +10,7 @@ from dropanchor_service.estimation.fleet.frontend.event import HEADING_EVENT, PR
 from dropanchor_service.estimation.fleet.frontend.height import add_pressure, height_at
 from dropanchor_service.estimation.fleet.frontend.inertial import add_sample, close_node
 from dropanchor_service.estimation.fleet.frontend.lever import apply_lever
-from dropanchor_service.estimation.fleet.frontend.node import NO_MEASUREMENT, RANGE, Node, Nodes
+from dropanchor_service.estimation.fleet.frontend.node import NO_HEADING, NO_MEASUREMENT, RANGE, Node, Nodes
 from dropanchor_service.estimation.fleet.frontend.platform import (
     Platform,
     add_reading,
@@ -31,7 +31,7 @@ def _close(front: Frontend, platform: Platform, row: Any, t_ns: int, node: Node)
     node.row = -1
     node.t_ns = t_ns
     node.kind = NO_MEASUREMENT
-    node.lag_s = 0.0
+    node.lag_s = node.wander_var = 0.0
     if front.running == 1:
         newest = max(t_ns, front.t_imu, front.t_node)
         carried = front.carrying.carried
@@ -56,7 +56,7 @@ def _measure(node: Node, event: Event, row: Any, platform: Platform) -> None:
     node.z = event.value
     node.z_std = event.std
     node.lag_s = (node.t_ns - event.t_ns) * 1e-9
-    if row.start.known == 1 and not np.isfinite(node.dv_var):
+    if row.start.known == 1 and not np.isfinite(node.dv_var) and node.heading_kind != NO_HEADING:
         detect_first_motion(platform, node, event.value if node.kind == RANGE else np.nan, row.settings.range_std)
 
 

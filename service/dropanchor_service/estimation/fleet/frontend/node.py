@@ -42,6 +42,7 @@ NODE: Final = np.dtype(
         ("tilt_gain", np.float64),  # share of the acceleration that the tilt took for gravity in the interval
         ("dv_var", np.float64),  # (m/s)^2, inf without an accelerometer
         ("motion_var", np.float64),  # (m/s)^2, what of dv_var is motion of the vehicle: it shakes along one direction
+        ("wander_var", np.float64),  # m^2, of each coordinate of a tag whose motion no sensor observes; 0: one does
         ("heading", np.float64),  # rad, body yaw at the end of the interval
         ("heading_var", np.float64),  # rad^2
         ("heading_kind", np.uint8),

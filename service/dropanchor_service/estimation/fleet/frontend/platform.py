@@ -19,6 +19,7 @@ from dropanchor_service.estimation.fleet.frontend.node import (
     MOVING,
     NO_HEADING,
     NOT_MOVED,
+    RESTING,
     Node,
 )
 from dropanchor_service.estimation.fleet.frontend.state import Frontend
@@ -44,6 +45,8 @@ Platform: TypeAlias = Any  # a record of PLATFORM
 NOISE = 1.6e-5  # rad^2/s, of a platform's increments
 READING_STD = 0.1  # rad, of a reading whose std is not told
 EXTRAPOLATE = 0.25  # s
+WANDER = 2.0  # m^2/s, of each coordinate of a tag of which only ranges are known
+TURN = 1.0  # rad^2/s, of its heading
 STILL_RATE = 0.03  # rad/s
 STILL_RANGES = 5  # ranges that agree with a tag that stands
 
@@ -75,6 +78,7 @@ def fill_platform_node(p: Platform, t_ns: int, node: Node) -> None:
     node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
     node.unobserved_s = 0.0
     if p.reading_count == 0:
+        _wander(p, t_ns, node)
         return
     ahead = (t_ns - p.t_heading) * 1e-9
     heading = wrap(p.heading + p.rate * max(min(ahead, EXTRAPOLATE), -EXTRAPOLATE))
@@ -85,6 +89,15 @@ def fill_platform_node(p: Platform, t_ns: int, node: Node) -> None:
     std = p.std if math.isfinite(p.std) else 0.02
     node.heading, node.heading_var, node.heading_kind = heading, std * std, DERIVED_HEADING
     p.t_node, p.node_heading = t_ns, heading
+
+
+@njit(nogil=True)
+def _wander(p: Platform, t_ns: int, node: Node) -> None:
+    """Fill a node of which nothing is known but its time: the tag wanders, and has no speed or course to follow."""
+    if p.t_node > 0:
+        node.dt_s = max((t_ns - p.t_node) * 1e-9, 0.0)
+    node.rest, node.dyaw_var, node.wander_var = RESTING, TURN * node.dt_s, WANDER * node.dt_s
+    p.t_node = t_ns
 
 
 @njit(nogil=True)

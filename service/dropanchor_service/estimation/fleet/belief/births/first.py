@@ -7,8 +7,9 @@ import numpy as np
 
 from dropanchor_service.estimation.fleet.angles import TWO_PI, wrap
 from dropanchor_service.estimation.fleet.belief.births.direction import can_turn, may_reverse
+from dropanchor_service.estimation.fleet.belief.births.fix import start_at_fix
 from dropanchor_service.estimation.fleet.belief.births.forgetting import MODE, PLACE, SIGHT, forget
-from dropanchor_service.estimation.fleet.belief.births.numbers import GIVEN_START, RING
+from dropanchor_service.estimation.fleet.belief.births.numbers import FIX, GIVEN_START, RING
 from dropanchor_service.estimation.fleet.belief.births.switches import is_on
 from dropanchor_service.estimation.fleet.belief.heading_models import reference_error, reset_models
 from dropanchor_service.estimation.fleet.belief.heading_reference import add_common_rotation, add_reference_error
@@ -125,7 +126,7 @@ def _start_at_place(work: Hypotheses, row: Row, anchor: Anchor, node: Node, t: T
     given = math.isfinite(start.heading)
     known = is_yaw_known(row, node)
     signs = _signs_at_place(row, node, t)
-    ring = 1 if known else (t.coarse_bearings if signs > 0 else _bearings(row, t))
+    ring = 1 if known or start.free == 1 else (t.coarse_bearings if signs > 0 else _bearings(row, t))
     cell, moving = TWO_PI / ring, t.coarse_speeds * signs
     choose_model(row, node, t)
     for h in range(ring * (1 + moving)):
@@ -223,9 +224,12 @@ def collect_start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: T
     start.collected_s += node.dt_s
     if node.kind == RANGE and row.anchor < 0:
         row.anchor = node.anchor
-    if node.heading_kind == NO_HEADING:
+    is_free = node.heading_kind == NO_HEADING
+    fixed = is_on(FIX, t) and start_at_fix(row, node, anchors)
+    if is_free and not fixed:
         row.publication.reason = NO_HEADING_YET
         return 0
+    start.free = 1 if is_free else 0
     if node.heading_kind == MEASURED_HEADING and row.heading.models_started == 0:
         reset_models(row, node.heading, node.heading_var)
     if row.anchor < 0:

@@ -30,7 +30,8 @@ RING_AGAIN: Final = 21
 WALKED_OFF: Final = 22
 AFTER_GAP: Final = 23
 MIRRORED_START: Final = 24
-BIRTHS: Final = 25
+FIX: Final = 25
+BIRTHS: Final = 26
 
 ALL: Final = (1 << BIRTHS) - 1  # all of them on
 
