@@ -49,8 +49,8 @@ def test_an_exact_range_has_no_innovation(name: str, anchor: int) -> None:
     records = innovations(ENGINES[name](), anchor)
     own = records[records["anchor"] == anchor][:3]
     assert len(own) == 3
-    np.testing.assert_allclose(own["innovation"], 0.0, atol=2e-3)
-    np.testing.assert_allclose(own["predicted"], own["measured"], atol=2e-3)
+    np.testing.assert_allclose(own["innovation"], 0.0, atol=5e-3)
+    np.testing.assert_allclose(own["predicted"], own["measured"], atol=5e-3)
 
 
 @pytest.mark.parametrize("name", ENGINES)

@@ -10,7 +10,7 @@ import pytest
 
 from dropanchor_schemas.wire import Frame, decode_packed
 from dropanchor_service.answers.answers import Answers
-from dropanchor_service.answers.hints import HINTS, RELATIVE_HINT
+from dropanchor_service.answers.hints import FORWARD_UNKNOWN, HINTS, RELATIVE_HINT
 from dropanchor_service.estimation.columns import ANCHOR, IMU, RANGE, Array, SampleBatch, StateReason, default_settings
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.fleet.frontend.sorting import MAX_WAITING
@@ -103,7 +103,7 @@ def test_a_phone_that_posts_every_few_seconds_has_poses_that_come_so_much_later(
     assert period_s < lag_s < period_s + 0.4
     assert max(age_s for t_s, _, _, age_s in phone.seen if t_s > since_s) < lag_s
     lags = f"Its poses come up to {lag_s:.1f} s late, because its IMU samples come in batches"
-    others = {HINTS[StateReason.SEVERAL_MODES], HINTS[StateReason.UNCERTAIN], RELATIVE_HINT}
+    others = {HINTS[StateReason.SEVERAL_MODES], HINTS[StateReason.UNCERTAIN], FORWARD_UNKNOWN, RELATIVE_HINT}
     assert {hint for hint in phone.hints(since_s) if not hint.startswith(lags)} <= others
 
 
