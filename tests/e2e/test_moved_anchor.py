@@ -1,0 +1,82 @@
+"""Somebody moves the only anchor of a running service, and tells nobody at first."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import takewhile
+from typing import Any
+
+from dropanchor_schemas.pose import StateReason
+from dropanchor_schemas.wire import ENCODING_PACKED, Frame, encode_packed
+from dropanchor_tag_client.simulator.live import Delivery, deliveries
+from dropanchor_tag_client.simulator.ranging import AnchorPlace
+from dropanchor_tag_client.simulator.sensors import preset
+from support.service import Running, running_service
+from support.zenoh_router import wait_until
+
+SEED = 48_811
+FARTHER_X = 8.0  # m, to where somebody moves the anchor
+BEGAN_S = 60.0  # ago: long enough for this tag to be found
+
+
+class Sender:
+    """Sends simulated drives that began a while ago. anchor_x: where the anchor is in truth; it may change."""
+
+    def __init__(self, tags: int = 1) -> None:
+        self._t0_ns = time.time_ns() - int(BEGAN_S * 1e9)
+        models = preset("calibrated", range_hz=10.0, imu_hz=50.0)
+        self._tags = tags
+        self._at = {
+            x: deliveries(tags, "yard", SEED, replace(models, anchors=(AnchorPlace(x=x),)), self._t0_ns)
+            for x in (0.0, FARTHER_X)
+        }
+        self.anchor_x = 0.0
+
+    def send(self, service: Running) -> None:
+        """Send what the tags have measured until now."""
+        until_s = (time.time_ns() - self._t0_ns) * 1e-9
+        measured = {x: list(takewhile(lambda part: part.due_s < until_s, parts)) for x, parts in self._at.items()}
+        for index in range(self._tags):
+            self._post(service, index, [part for part in measured[self.anchor_x] if part.tag == index])
+
+    def _post(self, service: Running, index: int, parts: Sequence[Delivery]) -> None:
+        for batch in batched(parts, 100):
+            frame = Frame([one for part in batch for one in part.imu], [one for part in batch for one in part.ranges])
+            headers = {"content-type": ENCODING_PACKED}
+            body = encode_packed(frame)
+            service.ask(
+                "POST", f"/api/v1/ingest/samples?tag=cart-{index}", content=body, headers=headers
+            ).raise_for_status()
+
+    def until(self, service: Running, is_wanted: Callable[[dict[str, Any]], bool]) -> list[dict[str, Any]]:
+        """Send until the new poses of all tags are wanted, and return them."""
+        found: list[list[dict[str, Any]]] = []
+        since_ns = time.time_ns()
+
+        def have_it() -> bool:
+            self.send(service)
+            found.append([pose for pose in service.get("/api/v1/poses")["poses"] if pose["t_ns"] > since_ns])
+            return len(found[-1]) == self._tags and all(map(is_wanted, found[-1]))
+
+        wait_until(have_it)
+        return found[-1]
+
+
+def batched(parts: Sequence[Delivery], size: int) -> Iterator[Sequence[Delivery]]:
+    return (parts[first : first + size] for first in range(0, len(parts), size))
+
+
+def is_doubted(pose: dict[str, Any]) -> bool:
+    return bool(pose["reason"] == StateReason.ANCHOR_DOUBTED)
+
+
+def test_tags_of_an_anchor_that_somebody_moves_are_ambiguous_until_its_place_is_told() -> None:
+    sender = Sender(tags=5)
+    with running_service() as service:
+        sender.until(service, lambda pose: pose["reason"] == StateReason.RESOLVED)
+        sender.anchor_x = FARTHER_X
+        poses = sender.until(service, is_doubted)
+        assert {pose["state"] for pose in poses} == {"ambiguous"}
+        assert all(pose["hint"].startswith("Anchor 1 seems to have moved by ") for pose in poses)
+        service.put("/api/v1/anchors/1", {"id": "1", "x": FARTHER_X})
+        sender.until(service, lambda pose: not is_doubted(pose))
