@@ -88,7 +88,8 @@ def test_what_was_set_here_is_given_back_to_the_settings_file(chromium: Browser,
         values = dialog.get_by_role("list", name="Where values come from")
         expect(values).to_contain_text("site › name: Hof (set here) instead of Yard (yard.toml)")
         expect(values).to_contain_text(
-            "anchors › 1: x 50, y 0, z 2.5 (set here) instead of x 0, y 0, z 2.5 (yard.toml)"
+            "anchors › 1: x 50, y 0, z 2.5, mirrors_behind true (set here) "
+            "instead of x 0, y 0, z 2.5, mirrors_behind true (yard.toml)"
         )
         expect(values).to_contain_text("tags › cart › height_m: 1.5 (set here) instead of 1.2")
         assert violations(page.page, axe) == []

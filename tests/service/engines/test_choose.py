@@ -50,7 +50,8 @@ def test_a_tag_without_a_start_does_not_start_at_the_origin() -> None:
 
 
 def test_anchors_keep_their_order() -> None:
-    assert anchor_columns([Anchor(id="1", x=1.0), Anchor(id="2", z=3.0)]).tolist() == [(1.0, 0.0, 0.0), (0.0, 0.0, 3.0)]
+    places = anchor_columns([Anchor(id="1", x=1.0), Anchor(id="2", z=3.0)])
+    assert places[["x", "y", "z"]].tolist() == [(1.0, 0.0, 0.0), (0.0, 0.0, 3.0)]
     assert len(anchor_columns([])) == 0
 
 

@@ -19,8 +19,8 @@ from dropanchor_service.estimation.fleet.belief.pool import release, slots_of
 from dropanchor_service.estimation.fleet.compiled import njit
 
 HEARD_NS: Final = 60_000_000_000  # an anchor that a tag heard longer ago does not hold its track
-SAME_M: Final = 1e-6
-NEAREST_M: Final = 0.1
+SAME_M: Final = 1e-6  # what rounding leaves is no difference of two ways
+NEAREST_M: Final = 0.1  # a slant distance is not shortened below it
 DILUTED: Final = 2.0  # by how much further than an anchor a place is off that several anchors gave
 
 

@@ -36,7 +36,7 @@ _HEADER = (
 
 
 def _line(birth: Birth) -> tuple[str, ...]:
-    needed = f"{birth.needed_by} (decision {birth.decision})".replace("*", "\\*")
+    needed = (birth.needed_by + (f" (decision {birth.decision})" if birth.decision else "")).replace("*", "\\*")
     name = f"`{birth.name}`"
     kind = (birth.source, birth.target, birth.prior)
     return name, birth.when, birth.guard, *kind, birth.changes, birth.period, birth.depth, needed

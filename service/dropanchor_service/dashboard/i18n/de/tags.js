@@ -7,7 +7,7 @@ export default {
   "state.ambiguous.meaning": "Mehr als eine Position passt zu den Messungen.",
   "state.tracking": "Geortet",
   "state.tracking.meaning": "Der Pose und ihrer Ellipse kann man vertrauen.",
-  "state.coasting": "Vorausberechnet",
+  "state.coasting": "Geschätzt",
   "state.coasting.meaning": "Zurzeit keine Distanzen: nur aus der Bewegung vorhergesagt.",
   "state.degraded": "Ungenau",
   "state.degraded.meaning": "Geortet, aber mit schlechten Daten: Die Position ist grob.",
