@@ -71,7 +71,7 @@ def _unpacked(receive: Receive, packing: str, max_bytes: int) -> Receive:
         is_whole = (
             unpacker.eof or unpacker.unconsumed_tail or message.get("more_body") or message["type"] != "http.request"
         )
-        if not is_whole:
+        if not is_whole or unpacker.unused_data:  # a second packed body behind the first would be lost without a word
             raise ProblemError(Kind.INVALID_REQUEST, _not_packed(packing))
         return {**message, "body": body}
 

@@ -112,6 +112,7 @@ def test_a_packed_body_is_unpacked(packing: str) -> None:
         ("br", b"x", 415, "The Content-Encoding br is not read: gzip, deflate or none is."),
         ("gzip", b"{}", 422, "The body is not whole gzip, which Content-Encoding says it is."),
         ("gzip", gzip.compress(bytes(10))[:-9], 422, "The body is not whole gzip"),
+        ("gzip", 2 * gzip.compress(encode_json(FRAME)), 422, "The body is not whole gzip"),  # two, one behind the other
         ("gzip", gzip.compress(bytes(50 * MAX_BODY_BYTES)), 413, "A request body may have at most"),
     ],
 )
