@@ -28,8 +28,8 @@ from dropanchor_service.api.routes.plan_images import MAX_UPLOAD_BYTES
 from dropanchor_service.api.routes.shared_parts import SharedParts
 from dropanchor_service.api.routes.site_of_request import SitesOfApp
 from dropanchor_service.api.routes.site_parts import SiteParts
-from dropanchor_service.api.routes.sites import sites_router
-from dropanchor_service.api.site_routers import ingest_routers, site_routers
+from dropanchor_service.api.routes.sites import routes_of_sites
+from dropanchor_service.api.site_routers import INGEST, SITE
 from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.phones.intake import Receive
 from dropanchor_service.plans.store import PlanStore
@@ -129,10 +129,9 @@ def create_app_of(
 @cache
 def _routes(has_one_site: bool) -> tuple[BaseRoute, ...]:
     """Return the routes of the sites. They hold nothing of an application, so all those of a process share them."""
-    of_site = site_routers()
-    without_site = of_site if has_one_site else ingest_routers()
-    routers = (*without_site, sites_router(of_site))
-    return tuple(route for router in routers for route in below(PREFIX, router.routes))
+    without_site = SITE if has_one_site else INGEST
+    own = [route for router in without_site for route in router.routes]
+    return tuple(below(PREFIX, [*own, *routes_of_sites(SITE)]))
 
 
 def _refuse_what_names_no_site(app: FastAPI, sites: int) -> None:

@@ -9,11 +9,8 @@ from starlette.routing import BaseRoute
 
 from dropanchor_service.api.http.site_in_path import OMLOX_PREFIX
 from dropanchor_service.api.omlox.document import document_of
-from dropanchor_service.api.omlox.feed.socket import feed_router
-from dropanchor_service.api.omlox.routes.fences import fences_router
-from dropanchor_service.api.omlox.routes.providers import providers_router
-from dropanchor_service.api.omlox.routes.trackables import trackables_router
-from dropanchor_service.api.omlox.routes.zones import zones_router
+from dropanchor_service.api.omlox.feed import socket
+from dropanchor_service.api.omlox.routes import fences, providers, trackables, zones
 from dropanchor_service.api.routes.below import below
 from dropanchor_service.api.routes.parameters import json_response
 from dropanchor_service.api.routes.site_of_request import SITE_PREFIX
@@ -25,12 +22,12 @@ VERSIONS = ("v2", "v1")
 @cache
 def omlox_routes(has_one_site: bool) -> tuple[BaseRoute, ...]:
     """Return the interface, with a document of its own: of each site below its id, and of an only one."""
-    described, feed = described_routes(), feed_router()
+    described = described_routes()
     found: list[BaseRoute] = []
     for version in VERSIONS:
         path = f"{OMLOX_PREFIX}{version}"
         for prefix in (SITE_PREFIX + path, *([path] if has_one_site else [])):
-            for router in (described, feed, _document_router(described)):
+            for router in (described, socket.router, _document_router(described)):
                 found += below(prefix, router.routes, documented=False)
     return tuple(found)
 
@@ -38,8 +35,8 @@ def omlox_routes(has_one_site: bool) -> tuple[BaseRoute, ...]:
 def described_routes() -> APIRouter:
     """Return the routes that the document describes."""
     router = APIRouter()
-    for part in (trackables_router(), providers_router(), zones_router(), fences_router()):
-        router.routes.extend(part.routes)
+    for part in (trackables, providers, zones, fences):
+        router.routes.extend(part.router.routes)
     return router
 
 

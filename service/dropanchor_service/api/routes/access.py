@@ -9,20 +9,17 @@ from dropanchor_service.api.routes.parameters import NO_QUERY, example_response,
 from dropanchor_service.api.routes.site_of_request import answers_of
 from dropanchor_service.security.identity import Scope
 
+router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
 
-def access_router() -> APIRouter:
-    router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
 
-    @router.get(
-        "/access",
-        operation_id="get_access",
-        summary="Get what the credentials of this request allow",
-        response_model=ClientAccess,
-        responses=example_response({"scope": "admin"}) | problems(Kind.INVALID_REQUEST),
-    )
-    async def get_access(request: Request) -> Response:
-        answers_of(request)  # an unknown one is refused
-        scope: Scope = getattr(request.state, "scope", Scope.ADMIN)  # without authentication everybody may do all
-        return json_response({"scope": scope.word})
-
-    return router
+@router.get(
+    "/access",
+    operation_id="get_access",
+    summary="Get what the credentials of this request allow",
+    response_model=ClientAccess,
+    responses=example_response({"scope": "admin"}) | problems(Kind.INVALID_REQUEST),
+)
+async def get_access(request: Request) -> Response:
+    answers_of(request)  # an unknown one is refused
+    scope: Scope = getattr(request.state, "scope", Scope.ADMIN)  # without authentication everybody may do all
+    return json_response({"scope": scope.word})

@@ -36,81 +36,69 @@ The key works in this site alone, until it expires or is revoked. Its `secret` i
 hash. A key with a tag sends the samples of that tag and does nothing else; the page `/tag/` makes a phone that tag."""
 
 
-def api_keys_router() -> APIRouter:
-    router = APIRouter(tags=["keys"], dependencies=[NO_QUERY])
-    _add_list_route(router)
-    _add_create_route(router)
-    _add_revoke_route(router)
-    return router
+router = APIRouter(tags=["keys"], dependencies=[NO_QUERY])
 
 
-def _add_list_route(router: APIRouter) -> None:
-    @router.get(
-        "/keys",
-        operation_id="list_keys",
-        summary="List the API keys of the site, but for those of administrators",
-        response_model=AccessKeyList,
-        responses=example_response({"available": True, "keys": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
-    )
-    def list_keys(request: Request) -> Response:
-        keys = _all_keys(request)
-        found = sorted(_keys_of(request, keys).items(), key=lambda entry: entry[1].made)
-        listed = [_shown(identifier, key).model_dump() for identifier, key in found]
-        return json_response({"available": keys is not None and keys.can_change, "keys": listed})
+@router.get(
+    "/keys",
+    operation_id="list_keys",
+    summary="List the API keys of the site, but for those of administrators",
+    response_model=AccessKeyList,
+    responses=example_response({"available": True, "keys": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
+)
+def list_keys(request: Request) -> Response:
+    keys = _all_keys(request)
+    found = sorted(_keys_of(request, keys).items(), key=lambda entry: entry[1].made)
+    listed = [_shown(identifier, key).model_dump() for identifier, key in found]
+    return json_response({"available": keys is not None and keys.can_change, "keys": listed})
 
 
-def _add_create_route(router: APIRouter) -> None:
-    @router.post(
-        "/keys",
-        operation_id="create_key",
-        summary="Create an API key for reading, writing, or a tag",
-        description=_DESCRIPTION,
-        status_code=201,
-        response_model=NewAccessKey,
-        responses=example_response(_EXAMPLE | {"secret": _SECRET}, 201)
-        | problems(
-            Kind.NO_ACCESS_CONTROL, Kind.EXISTS_ALREADY, Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED
-        ),
-    )
-    def create_key(
-        body: Annotated[KeyRequest, Body(examples=[{"name": "Early shift", "scope": "write"}])], request: Request
-    ) -> Response:
-        site, keys = parts_of(request).id, _all_keys(request)
-        if keys is None:
-            raise ProblemError(Kind.NO_ACCESS_CONTROL, say("key_free", "Without access control nobody needs a key."))
-        if any(key.name == body.name for key in keys.all().values()):
-            raise ProblemError(
-                Kind.EXISTS_ALREADY,
-                say("key_taken", "There is a key named {name} already: choose another name.", name=repr(body.name)),
-            )
-        with _changing(keys), trail_of(request).changing(Change("key", body.name, None, body)) as change:
-            secret = _made(keys, body, site)
-            identifier = secret.split("_")[1]
-            change.after = shown = _shown(identifier, keys.all()[identifier])
-        return json_response(shown.model_dump() | {"secret": secret}, status=201)
-
-
-def _add_revoke_route(router: APIRouter) -> None:
-    @router.delete(
-        "/keys/{key}",
-        operation_id="revoke_key",
-        summary="Revoke an API key, which ends its streams",
-        status_code=204,
-        responses=problems(Kind.UNKNOWN_KEY, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
-    )
-    def revoke_key(
-        key: Annotated[str, Path(description="The id of the key.", examples=[_EXAMPLE["id"]])], request: Request
-    ) -> None:
-        keys = _all_keys(request)
-        unknown = ProblemError(
-            Kind.UNKNOWN_KEY, say("no_such_key", "There is no such key. GET /api/v1/keys lists them.")
+@router.post(
+    "/keys",
+    operation_id="create_key",
+    summary="Create an API key for reading, writing, or a tag",
+    description=_DESCRIPTION,
+    status_code=201,
+    response_model=NewAccessKey,
+    responses=example_response(_EXAMPLE | {"secret": _SECRET}, 201)
+    | problems(Kind.NO_ACCESS_CONTROL, Kind.EXISTS_ALREADY, Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED),
+)
+def create_key(
+    body: Annotated[KeyRequest, Body(examples=[{"name": "Early shift", "scope": "write"}])], request: Request
+) -> Response:
+    site, keys = parts_of(request).id, _all_keys(request)
+    if keys is None:
+        raise ProblemError(Kind.NO_ACCESS_CONTROL, say("key_free", "Without access control nobody needs a key."))
+    if any(key.name == body.name for key in keys.all().values()):
+        raise ProblemError(
+            Kind.EXISTS_ALREADY,
+            say("key_taken", "There is a key named {name} already: choose another name.", name=repr(body.name)),
         )
-        known = _keys_of(request, keys).get(key)
-        if keys is None or known is None:
+    with _changing(keys), trail_of(request).changing(Change("key", body.name, None, body)) as change:
+        secret = _made(keys, body, site)
+        identifier = secret.split("_")[1]
+        change.after = shown = _shown(identifier, keys.all()[identifier])
+    return json_response(shown.model_dump() | {"secret": secret}, status=201)
+
+
+@router.delete(
+    "/keys/{key}",
+    operation_id="revoke_key",
+    summary="Revoke an API key, which ends its streams",
+    status_code=204,
+    responses=problems(Kind.UNKNOWN_KEY, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
+)
+def revoke_key(
+    key: Annotated[str, Path(description="The id of the key.", examples=[_EXAMPLE["id"]])], request: Request
+) -> None:
+    keys = _all_keys(request)
+    unknown = ProblemError(Kind.UNKNOWN_KEY, say("no_such_key", "There is no such key. GET /api/v1/keys lists them."))
+    known = _keys_of(request, keys).get(key)
+    if keys is None or known is None:
+        raise unknown
+    with _changing(keys), trail_of(request).changing(Change("key", known.name, _shown(key, known), None)):
+        if not keys.revoke_id(key):
             raise unknown
-        with _changing(keys), trail_of(request).changing(Change("key", known.name, _shown(key, known), None)):
-            if not keys.revoke_id(key):
-                raise unknown
 
 
 def _made(keys: ApiKeys, body: KeyRequest, site: str) -> str:

@@ -81,50 +81,44 @@ class AuditFileQuery(AuditFilter):
     format: Literal["csv", "jsonl"] = Field(default="jsonl", description="JSON lines, or CSV with JSON in two columns.")
 
 
-def audit_router() -> APIRouter:
-    router = APIRouter(tags=["site"])
-    _add_list_route(router)
-    _add_file_route(router)
-    return router
+router = APIRouter(tags=["site"])
 
 
-def _add_list_route(router: APIRouter) -> None:
-    @router.get(
-        "/audit",
-        operation_id="list_changes",
-        summary="List who changed which setting, when, and what it was before",
-        description=_DESCRIPTION,
-        response_model=AuditList,
-        responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE),
+@router.get(
+    "/audit",
+    operation_id="list_changes",
+    summary="List who changed which setting, when, and what it was before",
+    description=_DESCRIPTION,
+    response_model=AuditList,
+    responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE),
+)
+def list_changes(query: Annotated[AuditQuery, Query()], request: Request) -> Response:
+    wanted = replace(query.wanted(request), before=query.before)
+    with reading():
+        found = parts_of(request).events.trail.entries(wanted, query.limit + 1)
+    shown = found[: query.limit]
+    return json_response({"entries": shown, "next": shown[-1]["number"] if len(found) > len(shown) else None})
+
+
+@router.get(
+    "/audit/file",
+    operation_id="get_changes_file",
+    summary="Download who changed which setting, as CSV or JSON lines",
+    response_class=StreamingResponse,
+    responses=problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE)
+    | {200: {"content": {"application/jsonl": TEXT, "text/csv": TEXT}}},
+)
+def get_changes_file(query: Annotated[AuditFileQuery, Query()], request: Request) -> Response:
+    pages = _pages(parts_of(request).events.trail, query.wanted(request))
+    entries = chain(next(pages), chain.from_iterable(pages))  # what cannot be read is refused before it begins
+    lines, media_type = (
+        (csv_lines(entries), "text/csv") if query.format == "csv" else (json_lines(entries), "application/jsonl")
     )
-    def list_changes(query: Annotated[AuditQuery, Query()], request: Request) -> Response:
-        wanted = replace(query.wanted(request), before=query.before)
-        with reading():
-            found = parts_of(request).events.trail.entries(wanted, query.limit + 1)
-        shown = found[: query.limit]
-        return json_response({"entries": shown, "next": shown[-1]["number"] if len(found) > len(shown) else None})
-
-
-def _add_file_route(router: APIRouter) -> None:
-    @router.get(
-        "/audit/file",
-        operation_id="get_changes_file",
-        summary="Download who changed which setting, as CSV or JSON lines",
-        response_class=StreamingResponse,
-        responses=problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE)
-        | {200: {"content": {"application/jsonl": TEXT, "text/csv": TEXT}}},
-    )
-    def get_changes_file(query: Annotated[AuditFileQuery, Query()], request: Request) -> Response:
-        pages = _pages(parts_of(request).events.trail, query.wanted(request))
-        entries = chain(next(pages), chain.from_iterable(pages))  # what cannot be read is refused before it begins
-        lines, media_type = (
-            (csv_lines(entries), "text/csv") if query.format == "csv" else (json_lines(entries), "application/jsonl")
-        )
-        headers = {
-            "cache-control": "no-store",
-            "content-disposition": f'attachment; filename="changes.{query.format}"',
-        }
-        return StreamingResponse(lines, media_type=media_type, headers=headers)
+    headers = {
+        "cache-control": "no-store",
+        "content-disposition": f'attachment; filename="changes.{query.format}"',
+    }
+    return StreamingResponse(lines, media_type=media_type, headers=headers)
 
 
 def _pages(trail: ChangeTrail, wanted: Wanted) -> Iterator[list[dict[str, Any]]]:

@@ -43,52 +43,48 @@ Column = Annotated[int, Path(ge=0, lt=2**31, description="Column of the tile, fr
 Line = Annotated[int, Path(ge=0, lt=2**31, description="Line of the tile, from the north.", examples=[10749])]
 
 
-def basemap_router() -> APIRouter:
-    router = APIRouter(tags=["basemap"], dependencies=[NO_QUERY])
-
-    @router.get(
-        "/basemap",
-        operation_id="get_basemap",
-        summary="Get what the base map is, and who made it",
-        response_model=Basemap,
-        responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST),
-    )
-    async def get_basemap(request: Request) -> Response:
-        basemap = shared_of(request).basemap
-        return json_response((_NO_BASEMAP if basemap is None else basemap.description).model_dump())
-
-    _add_tile_route(router)
-    return router
+router = APIRouter(tags=["basemap"], dependencies=[NO_QUERY])
 
 
-def _add_tile_route(router: APIRouter) -> None:
-    @router.get(
-        "/basemap/{z}/{x}/{y}",
-        operation_id="get_basemap_tile",
-        summary="Get a tile of the base map",
-        description="A tile in web Mercator, as OpenStreetMap numbers them. It is never compressed.",
-        response_class=Response,
-        responses=_TILE | problems(Kind.NO_BASEMAP, Kind.INVALID_REQUEST, Kind.BASEMAP_UNREADABLE),
-    )
-    def get_basemap_tile(
-        z: Zoom,
-        x: Column,
-        y: Line,
-        request: Request,
-        if_none_match: Annotated[str, Header(description="The `ETag` of the tile that you have.")] = "",
-    ) -> Response:
-        basemap = shared_of(request).basemap
-        if basemap is None:
-            raise ProblemError(Kind.NO_BASEMAP, "The service has no base map: `basemap.tiles` is not set.")
-        if max(x, y) >= 1 << z:
-            raise ProblemError(Kind.INVALID_REQUEST, f"path: at zoom {z}, x and y are below {1 << z}")
-        headers = {"etag": f'"{basemap.file.version}"', "cache-control": "private, no-cache"}
-        if headers["etag"] in if_none_match:
-            return Response(status_code=304, headers=headers)
-        tile = _tile(basemap, z, x, y)
-        if tile is None:
-            return Response(status_code=204, headers=headers)
-        return Response(tile, media_type=basemap.file.media_type, headers=headers)
+@router.get(
+    "/basemap",
+    operation_id="get_basemap",
+    summary="Get what the base map is, and who made it",
+    response_model=Basemap,
+    responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST),
+)
+async def get_basemap(request: Request) -> Response:
+    basemap = shared_of(request).basemap
+    return json_response((_NO_BASEMAP if basemap is None else basemap.description).model_dump())
+
+
+@router.get(
+    "/basemap/{z}/{x}/{y}",
+    operation_id="get_basemap_tile",
+    summary="Get a tile of the base map",
+    description="A tile in web Mercator, as OpenStreetMap numbers them. It is never compressed.",
+    response_class=Response,
+    responses=_TILE | problems(Kind.NO_BASEMAP, Kind.INVALID_REQUEST, Kind.BASEMAP_UNREADABLE),
+)
+def get_basemap_tile(
+    z: Zoom,
+    x: Column,
+    y: Line,
+    request: Request,
+    if_none_match: Annotated[str, Header(description="The `ETag` of the tile that you have.")] = "",
+) -> Response:
+    basemap = shared_of(request).basemap
+    if basemap is None:
+        raise ProblemError(Kind.NO_BASEMAP, "The service has no base map: `basemap.tiles` is not set.")
+    if max(x, y) >= 1 << z:
+        raise ProblemError(Kind.INVALID_REQUEST, f"path: at zoom {z}, x and y are below {1 << z}")
+    headers = {"etag": f'"{basemap.file.version}"', "cache-control": "private, no-cache"}
+    if headers["etag"] in if_none_match:
+        return Response(status_code=304, headers=headers)
+    tile = _tile(basemap, z, x, y)
+    if tile is None:
+        return Response(status_code=204, headers=headers)
+    return Response(tile, media_type=basemap.file.media_type, headers=headers)
 
 
 def _tile(basemap: "ServedBasemap", z: int, x: int, y: int) -> bytes | None:

@@ -17,28 +17,26 @@ SIMULATED_TAG = "sim-1"
 _FORWARDED = ("forwarded", "x-forwarded-for", "x-real-ip", "via")
 
 
-def connect_router() -> APIRouter:
-    router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
+router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
 
-    @router.get(
-        "/connect",
-        operation_id="get_connect",
-        summary="Get the endpoints for tags, and a command that starts a simulated tag",
-        response_model=Connect,
-        responses=example_response(examples.CONNECT) | problems(Kind.INVALID_REQUEST),
-    )
-    async def get_connect(request: Request) -> Response:
-        site, is_local, shared = answers_of(request).site.site, _is_local(request), shared_of(request)
-        reachable = [reachable_endpoint(endpoint, _host(request)) for endpoint in shared.endpoints]
-        folder, credentials = None, shared.credentials
-        if credentials is not None:
-            bundle = credentials.bundle(credentials.table.common_name(site.id, SIMULATED_TAG))
-            folder = str(bundle.resolve()) if is_local else bundle.name
-        program, anchors = tag_command(show_path=is_local), [anchor.id for anchor in site.anchors]
-        command = simulate_command(program, reachable, site.id, anchors, folder)
-        return json_response({"endpoints": reachable, "credentials": credentials is not None, "simulate": command})
 
-    return router
+@router.get(
+    "/connect",
+    operation_id="get_connect",
+    summary="Get the endpoints for tags, and a command that starts a simulated tag",
+    response_model=Connect,
+    responses=example_response(examples.CONNECT) | problems(Kind.INVALID_REQUEST),
+)
+async def get_connect(request: Request) -> Response:
+    site, is_local, shared = answers_of(request).site.site, _is_local(request), shared_of(request)
+    reachable = [reachable_endpoint(endpoint, _host(request)) for endpoint in shared.endpoints]
+    folder, credentials = None, shared.credentials
+    if credentials is not None:
+        bundle = credentials.bundle(credentials.table.common_name(site.id, SIMULATED_TAG))
+        folder = str(bundle.resolve()) if is_local else bundle.name
+    program, anchors = tag_command(show_path=is_local), [anchor.id for anchor in site.anchors]
+    command = simulate_command(program, reachable, site.id, anchors, folder)
+    return json_response({"endpoints": reachable, "credentials": credentials is not None, "simulate": command})
 
 
 def _host(request: Request) -> str:

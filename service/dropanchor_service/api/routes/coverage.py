@@ -46,25 +46,23 @@ class CoverageQuery(BaseModel):
     )
 
 
-def coverage_router() -> APIRouter:
-    router = APIRouter(tags=["poses"])
+router = APIRouter(tags=["poses"])
 
-    @router.get(
-        "/history/coverage",
-        operation_id="get_history_coverage",
-        summary="Get when poses are stored",
-        description="When poses of any tag are stored. The period may have any length.",
-        response_model=Coverage,
-        responses=example_response(_EXAMPLE) | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
-    )
-    def get_history_coverage(query: Annotated[CoverageQuery, Query()], request: Request) -> Response:
-        tracks = history_of(answers_of(request))
-        try:
-            return json_response(_coverage(tracks, query))
-        except HistoryError as error:
-            raise unreadable(error) from error
 
-    return router
+@router.get(
+    "/history/coverage",
+    operation_id="get_history_coverage",
+    summary="Get when poses are stored",
+    description="When poses of any tag are stored. The period may have any length.",
+    response_model=Coverage,
+    responses=example_response(_EXAMPLE) | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
+)
+def get_history_coverage(query: Annotated[CoverageQuery, Query()], request: Request) -> Response:
+    tracks = history_of(answers_of(request))
+    try:
+        return json_response(_coverage(tracks, query))
+    except HistoryError as error:
+        raise unreadable(error) from error
 
 
 def _coverage(tracks: Tracks, query: CoverageQuery) -> dict[str, Any]:

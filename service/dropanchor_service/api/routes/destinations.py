@@ -34,154 +34,140 @@ _READ = (Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE)
 _ONE = (Kind.UNKNOWN_DESTINATION, *_READ)
 
 
-def destinations_router() -> APIRouter:
-    router = APIRouter(tags=["destinations"], dependencies=[NO_QUERY])
-    _add_read_routes(router)
-    _add_put_route(router)
-    _add_delete_route(router)
-    _add_test_route(router)
-    _add_dead_letter_list_route(router)
-    _add_dead_letter_change_routes(router)
-    return router
+router = APIRouter(tags=["destinations"], dependencies=[NO_QUERY])
 
 
-def _add_read_routes(router: APIRouter) -> None:
-    @router.get(
-        "/destinations",
-        operation_id="list_destinations",
-        summary="List the destinations and the state of their queues",
-        response_model=DestinationList,
-        responses=example_response({"destinations": [examples.DESTINATION_STATE], "unavailable": {}})
-        | problems(*_READ),
-    )
-    def list_destinations(request: Request) -> Response:
-        parts = parts_of(request).events
-        with reading():
-            queues = parts.deliveries.states()
-        states = [_state(parts, one, queues.get(one.id, QueueState())) for one in parts.destinations.all.values()]
-        listed = [state.model_dump(mode="json") for state in states]
-        unavailable = parts.channels.unavailable()
-        phrases = {kind: phrase_of(why) for kind, why in unavailable.items()}
-        return json_response({"destinations": listed, "unavailable": unavailable, "unavailable_phrases": phrases})
-
-    @router.get(
-        "/destinations/{destination}",
-        operation_id="get_destination",
-        summary="Get a destination and the state of its queue",
-        response_model=DestinationState,
-        responses=example_response(examples.DESTINATION_STATE) | problems(*_ONE),
-    )
-    def get_destination(destination: DestinationId, request: Request) -> Response:
-        parts = parts_of(request).events
-        return _response(parts, found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION))
+@router.get(
+    "/destinations",
+    operation_id="list_destinations",
+    summary="List the destinations and the state of their queues",
+    response_model=DestinationList,
+    responses=example_response({"destinations": [examples.DESTINATION_STATE], "unavailable": {}}) | problems(*_READ),
+)
+def list_destinations(request: Request) -> Response:
+    parts = parts_of(request).events
+    with reading():
+        queues = parts.deliveries.states()
+    states = [_state(parts, one, queues.get(one.id, QueueState())) for one in parts.destinations.all.values()]
+    listed = [state.model_dump(mode="json") for state in states]
+    unavailable = parts.channels.unavailable()
+    phrases = {kind: phrase_of(why) for kind, why in unavailable.items()}
+    return json_response({"destinations": listed, "unavailable": unavailable, "unavailable_phrases": phrases})
 
 
-def _add_put_route(router: APIRouter) -> None:
-    @router.put(
-        "/destinations/{destination}",
-        operation_id="put_destination",
-        summary="Create or replace a destination",
-        description="It gets the events from now on. A webhook inside needs its network among those of receivers: a "
-        "refusal for that names it as `network`. An e-mail needs a mail server, and MQTT a broker.",
-        response_model=DestinationState,
-        responses=example_response(examples.DESTINATION_STATE)
-        | problems(Kind.DESTINATION_REFUSED, *CHANGE_KINDS, *_READ),
-    )
-    def put_destination(
-        destination: DestinationId,
-        body: Annotated[Destination, Body(examples=[examples.WEBHOOK])],
-        allows: Conditions,
-        request: Request,
-    ) -> Response:
-        parts = parts_of(request).events
-        usable = _usable(parts, body)
-        put(parts.destinations, destination, body.id, usable, allows)
-        return _response(parts, usable)
+@router.get(
+    "/destinations/{destination}",
+    operation_id="get_destination",
+    summary="Get a destination and the state of its queue",
+    response_model=DestinationState,
+    responses=example_response(examples.DESTINATION_STATE) | problems(*_ONE),
+)
+def get_destination(destination: DestinationId, request: Request) -> Response:
+    parts = parts_of(request).events
+    return _response(parts, found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION))
 
 
-def _add_delete_route(router: APIRouter) -> None:
-    @router.delete(
-        "/destinations/{destination}",
-        operation_id="delete_destination",
-        summary="Delete a destination and its queue",
-        status_code=204,
-        responses=problems(Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, *_ONE),
-    )
-    def delete_destination(destination: DestinationId, allows: Conditions, request: Request) -> Response:
-        parts = parts_of(request).events
-        response = delete(parts.destinations, destination, allows, Kind.UNKNOWN_DESTINATION)
-        with reading():
-            parts.deliveries.drop(destination)
-        return response
+@router.put(
+    "/destinations/{destination}",
+    operation_id="put_destination",
+    summary="Create or replace a destination",
+    description="It gets the events from now on. A webhook inside needs its network among those of receivers: a "
+    "refusal for that names it as `network`. An e-mail needs a mail server, and MQTT a broker.",
+    response_model=DestinationState,
+    responses=example_response(examples.DESTINATION_STATE) | problems(Kind.DESTINATION_REFUSED, *CHANGE_KINDS, *_READ),
+)
+def put_destination(
+    destination: DestinationId,
+    body: Annotated[Destination, Body(examples=[examples.WEBHOOK])],
+    allows: Conditions,
+    request: Request,
+) -> Response:
+    parts = parts_of(request).events
+    usable = _usable(parts, body)
+    put(parts.destinations, destination, body.id, usable, allows)
+    return _response(parts, usable)
 
 
-def _add_test_route(router: APIRouter) -> None:
-    @router.post(
-        "/destinations/{destination}/test",
-        operation_id="test_destination",
-        summary="Send a test event to a destination now",
-        response_model=DestinationTest,
-        responses=example_response(examples.DESTINATION_TEST) | problems(Kind.DESTINATION_REFUSED, *_ONE),
-    )
-    async def test_destination(destination: DestinationId, request: Request) -> Response:
-        parts = parts_of(request).events
-        known = found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
-        try:
-            parts.channels.check_settings(known)
-        except ChannelError as error:
-            raise ProblemError(Kind.DESTINATION_REFUSED, with_stop(said_by(error))) from error
-        async with parts.channels.open(known) as channel:
-            outcome = (await channel.send([cloud_event(destination_test(known.id), 0, parts.store.site)]))[0]
-        answer = {"delivered": outcome.verdict is Verdict.ACCEPTED, "detail": outcome.warning or outcome.detail}
-        return json_response(answer)
+@router.delete(
+    "/destinations/{destination}",
+    operation_id="delete_destination",
+    summary="Delete a destination and its queue",
+    status_code=204,
+    responses=problems(Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, *_ONE),
+)
+def delete_destination(destination: DestinationId, allows: Conditions, request: Request) -> Response:
+    parts = parts_of(request).events
+    response = delete(parts.destinations, destination, allows, Kind.UNKNOWN_DESTINATION)
+    with reading():
+        parts.deliveries.drop(destination)
+    return response
 
 
-def _add_dead_letter_list_route(router: APIRouter) -> None:
-    @router.get(
-        "/destinations/{destination}/dead-letters",
-        operation_id="list_dead_letters",
-        summary="List the events whose delivery was given up",
-        response_model=DeadLetterList,
-        responses=example_response(examples.DEAD_LETTERS) | problems(*_ONE),
-    )
-    def list_dead_letters(destination: DestinationId, request: Request) -> Response:
-        parts = parts_of(request).events
-        found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
-        with reading():
-            dead = parts.deliveries.dead(destination)
-        letters = [{"event": orjson.Fragment(body), "reason": reason} for body, reason in dead]
-        return json_response({"dead_letters": letters})
+@router.post(
+    "/destinations/{destination}/test",
+    operation_id="test_destination",
+    summary="Send a test event to a destination now",
+    response_model=DestinationTest,
+    responses=example_response(examples.DESTINATION_TEST) | problems(Kind.DESTINATION_REFUSED, *_ONE),
+)
+async def test_destination(destination: DestinationId, request: Request) -> Response:
+    parts = parts_of(request).events
+    known = found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
+    try:
+        parts.channels.check_settings(known)
+    except ChannelError as error:
+        raise ProblemError(Kind.DESTINATION_REFUSED, with_stop(said_by(error))) from error
+    async with parts.channels.open(known) as channel:
+        outcome = (await channel.send([cloud_event(destination_test(known.id), 0, parts.store.site)]))[0]
+    answer = {"delivered": outcome.verdict is Verdict.ACCEPTED, "detail": outcome.warning or outcome.detail}
+    return json_response(answer)
 
 
-def _add_dead_letter_change_routes(router: APIRouter) -> None:
-    @router.post(
-        "/destinations/{destination}/dead-letters/retry",
-        operation_id="retry_dead_letters",
-        summary="Put the dead letters of a destination back into its queue",
-        description="A dead letter goes back by itself once, an hour after it became one.",
-        response_model=Retried,
-        responses=example_response({"retried": 1}) | problems(*_ONE),
-    )
-    def retry_dead_letters(destination: DestinationId, request: Request) -> Response:
-        site = parts_of(request)
-        found(site.events.destinations, destination, Kind.UNKNOWN_DESTINATION)
-        with reading():
-            return json_response({"retried": site.events.deliveries.retry(destination, site.answers.now_ns())})
+@router.get(
+    "/destinations/{destination}/dead-letters",
+    operation_id="list_dead_letters",
+    summary="List the events whose delivery was given up",
+    response_model=DeadLetterList,
+    responses=example_response(examples.DEAD_LETTERS) | problems(*_ONE),
+)
+def list_dead_letters(destination: DestinationId, request: Request) -> Response:
+    parts = parts_of(request).events
+    found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
+    with reading():
+        dead = parts.deliveries.dead(destination)
+    letters = [{"event": orjson.Fragment(body), "reason": reason} for body, reason in dead]
+    return json_response({"dead_letters": letters})
 
-    @router.delete(
-        "/destinations/{destination}/dead-letters",
-        operation_id="delete_dead_letters",
-        summary="Drop the dead letters of a destination",
-        description="The events themselves stay.",
-        status_code=204,
-        responses=problems(*_ONE),
-    )
-    def delete_dead_letters(destination: DestinationId, request: Request) -> Response:
-        parts = parts_of(request).events
-        found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
-        with reading():
-            parts.deliveries.drop_dead(destination)
-        return Response(status_code=204)
+
+@router.post(
+    "/destinations/{destination}/dead-letters/retry",
+    operation_id="retry_dead_letters",
+    summary="Put the dead letters of a destination back into its queue",
+    description="A dead letter goes back by itself once, an hour after it became one.",
+    response_model=Retried,
+    responses=example_response({"retried": 1}) | problems(*_ONE),
+)
+def retry_dead_letters(destination: DestinationId, request: Request) -> Response:
+    site = parts_of(request)
+    found(site.events.destinations, destination, Kind.UNKNOWN_DESTINATION)
+    with reading():
+        return json_response({"retried": site.events.deliveries.retry(destination, site.answers.now_ns())})
+
+
+@router.delete(
+    "/destinations/{destination}/dead-letters",
+    operation_id="delete_dead_letters",
+    summary="Drop the dead letters of a destination",
+    description="The events themselves stay.",
+    status_code=204,
+    responses=problems(*_ONE),
+)
+def delete_dead_letters(destination: DestinationId, request: Request) -> Response:
+    parts = parts_of(request).events
+    found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
+    with reading():
+        parts.deliveries.drop_dead(destination)
+    return Response(status_code=204)
 
 
 def _usable(parts: EventParts, destination: Destination) -> Destination:

@@ -72,57 +72,9 @@ class EventQuery(EventFilter):
     limit: int = Field(default=100, ge=1, le=MAX_EVENTS, description="How many events to return.")
 
 
-def events_router() -> APIRouter:
-    router = APIRouter(tags=["events"], dependencies=[Depends(_refuse_repeated)])
-    _add_list_route(router)
-    _add_stream_route(router)
-    return router
-
-
-def _add_list_route(router: APIRouter) -> None:
-    @router.get(
-        "/events",
-        operation_id="list_events",
-        summary="List stored events",
-        description="With `since` or `after`, the page begins there and `next` leads on. Without them, it holds the "
-        "newest events. Events are always in order.",
-        response_model=EventList,
-        responses=example_response(examples.EVENTS) | problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE),
-    )
-    def list_events(query: Annotated[EventQuery, Query()], request: Request) -> Response:
-        store = parts_of(request).events.store
-        selection, after = query.selection(query.since), query.position()
-        with reading():
-            if query.since is None and after is None:
-                found, leads_on = store.last(query.limit, selection), False
-            else:
-                found = store.after(after or 0, query.limit, selection)
-                leads_on = len(found) == query.limit
-        following = f"{found[-1].sequence:020}" if leads_on else None
-        return json_response({"events": [orjson.Fragment(event.body) for event in found], "next": following})
-
-
-def _add_stream_route(router: APIRouter) -> None:
-    @router.get(
-        "/events/stream",
-        operation_id="stream_events",
-        summary="Stream events as they happen",
-        description=_STREAM,
-        response_class=StreamingResponse,
-        responses=_event_stream() | problems(Kind.INVALID_REQUEST),
-    )
-    async def stream_events(
-        query: Annotated[EventFilter, Query()],
-        request: Request,
-        last_event_id: Annotated[
-            str | None, Header(description="The last id that the client has. Another text than an id is ignored.")
-        ] = None,
-    ) -> Response:
-        if last_event_id is not None and re.fullmatch(SEQUENCE, last_event_id):
-            query = query.model_copy(update={"after": last_event_id})
-        store, stopping = parts_of(request).events.store, shared_of(request).stopping
-        headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
-        return StreamingResponse(_stream(store, query, stopping), media_type=MEDIA_TYPE, headers=headers)
+def _event_stream() -> dict[int | str, dict[str, Any]]:
+    example = _message(StoredEvent(42, orjson.dumps(examples.EVENT))).decode()
+    return {200: {"content": {MEDIA_TYPE: {"example": example}}}}
 
 
 async def _refuse_repeated(request: Request) -> None:
@@ -130,6 +82,58 @@ async def _refuse_repeated(request: Request) -> None:
     for name in ("after", "since", "limit"):
         if len(request.query_params.getlist(name)) > 1:
             raise ProblemError(Kind.INVALID_REQUEST, f"query.{name}: is given more than once")
+
+
+def _message(event: StoredEvent) -> bytes:
+    kind = orjson.loads(event.body)["type"]
+    return f"id: {event.sequence:020}\nevent: {kind}\ndata: ".encode() + event.body + b"\n\n"
+
+
+router = APIRouter(tags=["events"], dependencies=[Depends(_refuse_repeated)])
+
+
+@router.get(
+    "/events",
+    operation_id="list_events",
+    summary="List stored events",
+    description="With `since` or `after`, the page begins there and `next` leads on. Without them, it holds the "
+    "newest events. Events are always in order.",
+    response_model=EventList,
+    responses=example_response(examples.EVENTS) | problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE),
+)
+def list_events(query: Annotated[EventQuery, Query()], request: Request) -> Response:
+    store = parts_of(request).events.store
+    selection, after = query.selection(query.since), query.position()
+    with reading():
+        if query.since is None and after is None:
+            found, leads_on = store.last(query.limit, selection), False
+        else:
+            found = store.after(after or 0, query.limit, selection)
+            leads_on = len(found) == query.limit
+    following = f"{found[-1].sequence:020}" if leads_on else None
+    return json_response({"events": [orjson.Fragment(event.body) for event in found], "next": following})
+
+
+@router.get(
+    "/events/stream",
+    operation_id="stream_events",
+    summary="Stream events as they happen",
+    description=_STREAM,
+    response_class=StreamingResponse,
+    responses=_event_stream() | problems(Kind.INVALID_REQUEST),
+)
+async def stream_events(
+    query: Annotated[EventFilter, Query()],
+    request: Request,
+    last_event_id: Annotated[
+        str | None, Header(description="The last id that the client has. Another text than an id is ignored.")
+    ] = None,
+) -> Response:
+    if last_event_id is not None and re.fullmatch(SEQUENCE, last_event_id):
+        query = query.model_copy(update={"after": last_event_id})
+    store, stopping = parts_of(request).events.store, shared_of(request).stopping
+    headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
+    return StreamingResponse(_stream(store, query, stopping), media_type=MEDIA_TYPE, headers=headers)
 
 
 @contextmanager
@@ -158,13 +162,3 @@ async def _stream(store: EventStore, query: EventFilter, stopping: ThreadEvent) 
         position = found[-1].sequence if len(found) == MAX_EVENTS else max(position, newest)
         if await stopped_within(POLL_S, stopping):
             return
-
-
-def _message(event: StoredEvent) -> bytes:
-    kind = orjson.loads(event.body)["type"]
-    return f"id: {event.sequence:020}\nevent: {kind}\ndata: ".encode() + event.body + b"\n\n"
-
-
-def _event_stream() -> dict[int | str, dict[str, Any]]:
-    example = _message(StoredEvent(42, orjson.dumps(examples.EVENT))).decode()
-    return {200: {"content": {MEDIA_TYPE: {"example": example}}}}

@@ -60,27 +60,31 @@ class FiguresQuery(TagsInPeriod):
     )
 
 
-def figures_router() -> APIRouter:
-    router = APIRouter(tags=["poses"])
+def _offers() -> dict[int | str, dict[str, Any]]:
+    offers = example_response(_EXAMPLE)
+    offers[200]["content"]["text/csv"] = TEXT
+    return offers
 
-    @router.get(
-        "/figures",
-        operation_id="get_figures",
-        summary="Get distance, speed and time in zones of tags",
-        description=_DESCRIPTION,
-        response_model=Figures,
-        responses=_offers()
-        | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE, Kind.EVENTS_UNREADABLE),
-    )
-    def get_figures(query: Annotated[FiguresQuery, Query()], request: Request) -> Response:
-        parts = parts_of(request)
-        found = _figures(parts.answers, parts.events, query)
-        if query.format == "json":
-            return json_response(found)
-        headers = {"cache-control": "no-store", "content-disposition": 'attachment; filename="figures.csv"'}
-        return Response(figures_csv(found), media_type="text/csv", headers=headers)
 
-    return router
+router = APIRouter(tags=["poses"])
+
+
+@router.get(
+    "/figures",
+    operation_id="get_figures",
+    summary="Get distance, speed and time in zones of tags",
+    description=_DESCRIPTION,
+    response_model=Figures,
+    responses=_offers()
+    | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE, Kind.EVENTS_UNREADABLE),
+)
+def get_figures(query: Annotated[FiguresQuery, Query()], request: Request) -> Response:
+    parts = parts_of(request)
+    found = _figures(parts.answers, parts.events, query)
+    if query.format == "json":
+        return json_response(found)
+    headers = {"cache-control": "no-store", "content-disposition": 'attachment; filename="figures.csv"'}
+    return Response(figures_csv(found), media_type="text/csv", headers=headers)
 
 
 def _figures(answers: Answers, events: EventParts, query: FiguresQuery) -> dict[str, Any]:
@@ -125,9 +129,3 @@ def _by_tag(times: Mapping[tuple[str, str], TimeInZone], zones: list[str]) -> di
 def _name_of(events: EventParts, zone: str) -> str | None:
     known = events.items.zones.all.get(zone)
     return None if known is None else known.name
-
-
-def _offers() -> dict[int | str, dict[str, Any]]:
-    offers = example_response(_EXAMPLE)
-    offers[200]["content"]["text/csv"] = TEXT
-    return offers

@@ -44,30 +44,28 @@ class HeatMapQuery(TagsInPeriod):
     )
 
 
-def heat_map_router() -> APIRouter:
-    router = APIRouter(tags=["poses"])
+router = APIRouter(tags=["poses"])
 
-    @router.get(
-        "/heat-map",
-        operation_id="get_heat_map",
-        summary="Get for how long tags were where",
-        description=_DESCRIPTION,
-        response_model=HeatMap,
-        responses=example_response(_EXAMPLE) | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
-    )
-    def get_heat_map(query: Annotated[HeatMapQuery, Query()], request: Request) -> Response:
-        answers = answers_of(request)
-        from_ns, to_ns = limits_of(query, answers.now_ns())
-        tracks = history_of(answers)
-        try:
-            tags = selected_tags(answers, tracks, query)
-            return json_response(_heat_map(tracks, tags, from_ns, to_ns, query.cell_m))
-        except TooMuchError as error:
-            raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
-        except HistoryError as error:
-            raise unreadable(error) from error
 
-    return router
+@router.get(
+    "/heat-map",
+    operation_id="get_heat_map",
+    summary="Get for how long tags were where",
+    description=_DESCRIPTION,
+    response_model=HeatMap,
+    responses=example_response(_EXAMPLE) | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
+)
+def get_heat_map(query: Annotated[HeatMapQuery, Query()], request: Request) -> Response:
+    answers = answers_of(request)
+    from_ns, to_ns = limits_of(query, answers.now_ns())
+    tracks = history_of(answers)
+    try:
+        tags = selected_tags(answers, tracks, query)
+        return json_response(_heat_map(tracks, tags, from_ns, to_ns, query.cell_m))
+    except TooMuchError as error:
+        raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
+    except HistoryError as error:
+        raise unreadable(error) from error
 
 
 def _heat_map(tracks: Tracks, tags: list[str] | None, from_ns: int, to_ns: int, cell_m: float) -> dict[str, Any]:

@@ -13,25 +13,23 @@ from dropanchor_service.history.errors import HistoryError
 _EXAMPLE = {"enabled": True, "from_ns": 1_797_408_000_000_000_000, "to_ns": 1_800_000_000_000_000_000}
 
 
-def history_router() -> APIRouter:
-    router = APIRouter(tags=["poses"], dependencies=[NO_QUERY])
+router = APIRouter(tags=["poses"], dependencies=[NO_QUERY])
 
-    @router.get(
-        "/history",
-        operation_id="get_history",
-        summary="Get whether poses are stored, and which time they cover",
-        response_model=History,
-        responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
-    )
-    def get_history(request: Request) -> Response:
-        answers = answers_of(request)
-        if answers.tracks is None:
-            return json_response({"enabled": False, "from_ns": None, "to_ns": None})
-        try:
-            span = answers.tracks.span()
-        except HistoryError as error:
-            raise unreadable(error) from error
-        from_ns, to_ns = (None, None) if span is None else span
-        return json_response({"enabled": True, "from_ns": from_ns, "to_ns": to_ns})
 
-    return router
+@router.get(
+    "/history",
+    operation_id="get_history",
+    summary="Get whether poses are stored, and which time they cover",
+    response_model=History,
+    responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
+)
+def get_history(request: Request) -> Response:
+    answers = answers_of(request)
+    if answers.tracks is None:
+        return json_response({"enabled": False, "from_ns": None, "to_ns": None})
+    try:
+        span = answers.tracks.span()
+    except HistoryError as error:
+        raise unreadable(error) from error
+    from_ns, to_ns = (None, None) if span is None else span
+    return json_response({"enabled": True, "from_ns": from_ns, "to_ns": to_ns})

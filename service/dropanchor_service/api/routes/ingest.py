@@ -2,7 +2,7 @@
 
 import asyncio
 from dataclasses import asdict
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
@@ -77,15 +77,13 @@ class OfSensorLogger(OfApp):
     )
 
 
-def ingest_router() -> APIRouter:
-    router = APIRouter(tags=["ingest"])
-    _add_samples_route(router)
-    _add_sensor_logger_route(router, ForEachSite(_phones))
-    return router
-
-
 def _phones(site: SiteParts) -> PhoneIntake[Message]:
     return PhoneIntake(site.receive, site.receive_health, parse, Session)
+
+
+router = APIRouter(tags=["ingest"])
+_phones_of = ForEachSite(_phones)
+_PHONE_ERROR = {"description": "A sentence that the app shows.", "content": {"text/plain": TEXT}}
 
 
 def encoding_of(request: Request) -> str:
@@ -93,62 +91,54 @@ def encoding_of(request: Request) -> str:
     return request.headers.get("content-type", "").partition(";")[0].strip().lower()
 
 
-def _add_samples_route(router: APIRouter) -> None:
-    @router.post(
-        "/ingest/samples",
-        operation_id="ingest_samples",
-        summary="Send samples of a tag",
-        description="One payload of the contract, chosen by Content-Type as over Zenoh by the encoding, of at most "
-        "65,536 bytes; the body may be packed (Content-Encoding: gzip or deflate). It is treated as if it had come "
-        "over Zenoh: order, clocks, admission and counters are the same. "
-        "Times before 2015 that do not count from boot are refused: they are not UTC in ns. So is a tag that the site "
-        "does not admit (`unknown_tags`).",
-        status_code=202,
-        response_model=SamplesReceived,
-        responses=example_response({"samples": 1}, 202)
-        | problems(Kind.INVALID_REQUEST, Kind.SAMPLES_REJECTED, Kind.BODY_TOO_LARGE, Kind.UNKNOWN_CONTENT_ENCODING),
-        openapi_extra={"requestBody": {"required": True, "content": _SAMPLES_BODY}},
-    )
-    async def ingest_samples(request: Request, query: Annotated[OfTag, Query()]) -> Response:
-        tag, payload = tag_of(request, query), await request.body()
-        encoding = encoding_of(request)
-        samples = take_samples(parts_of(request), tag, payload, encoding)
-        if isinstance(samples, Rejection):
-            raise ProblemError(Kind.SAMPLES_REJECTED, f"{samples.reason}: {samples.detail}.", reason=samples.reason)
-        return json_response({"samples": samples}, status=202)
+@router.post(
+    "/ingest/samples",
+    operation_id="ingest_samples",
+    summary="Send samples of a tag",
+    description="One payload of the contract, chosen by Content-Type as over Zenoh by the encoding, of at most "
+    "65,536 bytes; the body may be packed (Content-Encoding: gzip or deflate). It is treated as if it had come "
+    "over Zenoh: order, clocks, admission and counters are the same. "
+    "Times before 2015 that do not count from boot are refused: they are not UTC in ns. So is a tag that the site "
+    "does not admit (`unknown_tags`).",
+    status_code=202,
+    response_model=SamplesReceived,
+    responses=example_response({"samples": 1}, 202)
+    | problems(Kind.INVALID_REQUEST, Kind.SAMPLES_REJECTED, Kind.BODY_TOO_LARGE, Kind.UNKNOWN_CONTENT_ENCODING),
+    openapi_extra={"requestBody": {"required": True, "content": _SAMPLES_BODY}},
+)
+async def ingest_samples(request: Request, query: Annotated[OfTag, Query()]) -> Response:
+    tag, payload = tag_of(request, query), await request.body()
+    encoding = encoding_of(request)
+    samples = take_samples(parts_of(request), tag, payload, encoding)
+    if isinstance(samples, Rejection):
+        raise ProblemError(Kind.SAMPLES_REJECTED, f"{samples.reason}: {samples.detail}.", reason=samples.reason)
+    return json_response({"samples": samples}, status=202)
 
 
-def _add_sensor_logger_route(router: APIRouter, phones_of: ForEachSite[PhoneIntake[Message]]) -> None:
-    @router.post(
-        "/ingest/sensor-logger",
-        operation_id="ingest_sensor_logger",
-        summary="Send readings of a phone with the app Sensor Logger",
-        description="The address for the app's HTTP Push. Readings become IMU samples of the tag: at the times of the "
-        "gyroscope, x to the top edge of the phone. Messages are put in order and used once each.",
-        response_model=PhoneReadingsReceived,
-        responses=example_response(examples.PHONE_READINGS)
-        | problems(Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE)
-        | {PHONE_ERROR: _phone_error()},
-        openapi_extra={
-            "requestBody": {"required": True, "content": {"application/json": {"schema": _SENSOR_LOGGER_BODY}}}
-        },
-    )
-    async def ingest_sensor_logger(request: Request, query: Annotated[OfSensorLogger, Query()]) -> Response:
-        tag, phones, body = tag_of(request, query), phones_of(request), await request.body()
-        try:
-            posted = await run_in_threadpool(phones.post, tag, body, query.signs)
-        except PhoneError as error:
-            return PlainTextResponse(str(error), PHONE_ERROR)
-        if (refused := why_refused(parts_of(request), tag)) is not None:
-            return PlainTextResponse(refused.detail, PHONE_ERROR)
-        if posted.waiting:
-            loop = asyncio.get_running_loop()
-            loop.call_later(WAIT_S, loop.run_in_executor, None, phones.release_overdue)
-        return json_response(asdict(posted))
-
-
-def _phone_error() -> dict[str, Any]:
-    return {"description": "A sentence that the app shows.", "content": {"text/plain": TEXT}}
+@router.post(
+    "/ingest/sensor-logger",
+    operation_id="ingest_sensor_logger",
+    summary="Send readings of a phone with the app Sensor Logger",
+    description="The address for the app's HTTP Push. Readings become IMU samples of the tag: at the times of the "
+    "gyroscope, x to the top edge of the phone. Messages are put in order and used once each.",
+    response_model=PhoneReadingsReceived,
+    responses=example_response(examples.PHONE_READINGS)
+    | problems(Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE)
+    | {PHONE_ERROR: _PHONE_ERROR},
+    openapi_extra={"requestBody": {"required": True, "content": {"application/json": {"schema": _SENSOR_LOGGER_BODY}}}},
+)
+async def ingest_sensor_logger(request: Request, query: Annotated[OfSensorLogger, Query()]) -> Response:
+    tag, phones, body = tag_of(request, query), _phones_of(request), await request.body()
+    try:
+        posted = await run_in_threadpool(phones.post, tag, body, query.signs)
+    except PhoneError as error:
+        return PlainTextResponse(str(error), PHONE_ERROR)
+    if (refused := why_refused(parts_of(request), tag)) is not None:
+        return PlainTextResponse(refused.detail, PHONE_ERROR)
+    if posted.waiting:
+        loop = asyncio.get_running_loop()
+        loop.call_later(WAIT_S, loop.run_in_executor, None, phones.release_overdue)
+    return json_response(asdict(posted))
 
 
 def tag_of(request: Request, query: OfTag) -> str:

@@ -41,44 +41,45 @@ _BODY = {
 }
 
 
-def ingest_phyphox_router() -> APIRouter:
-    router = APIRouter(tags=["ingest"])
-    _add_experiment_routes(router)
-    _add_readings_route(router, ForEachSite(_phones))
-    return router
-
-
 def _phones(site: SiteParts) -> PhoneIntake[Message]:
     return PhoneIntake(site.receive, site.receive_health, parse, lambda _: PhyphoxSession())
 
 
-def _add_experiment_routes(router: APIRouter) -> None:
-    @router.get(
-        "/ingest/phyphox",
-        operation_id="get_phyphox_experiment",
-        summary="Get the experiment that makes the app phyphox send the motion of a tag",
-        description="Open `phyphox://HOST/api/v1/ingest/phyphox?token=KEY` on the phone. The file holds the key.",
-        response_class=Response,
-        responses=_file(MEDIA_TYPE, "The experiment.") | problems(Kind.INVALID_REQUEST),
-    )
-    async def get_phyphox_experiment(request: Request, query: Annotated[OfApp, Query()]) -> Response:
-        tag = tag_of(request, query)
-        content = experiment(_address(request), tag, secret_of(request))
-        named = {"content-disposition": 'attachment; filename="tag.phyphox"'}
-        return Response(content, media_type=MEDIA_TYPE, headers=_NEVER_STORE | named)
+def _file(media_type: str, description: str) -> dict[int | str, dict[str, Any]]:
+    return {200: {"content": {media_type: TEXT}, "description": description}}
 
-    @router.get(
-        "/ingest/phyphox/code",
-        operation_id="get_phyphox_code",
-        summary="Get the QR code that the app phyphox scans to load the experiment of a tag",
-        response_class=Response,
-        responses=_file(SVG, "The QR code.") | problems(Kind.INVALID_REQUEST),
-    )
-    async def get_phyphox_code(request: Request, query: Annotated[OfTag, Query()]) -> Response:
-        link = link_of(_address(request), tag_of(request, query), secret_of(request))
-        written = io.BytesIO()
-        segno.make(link, error="l").save(written, kind="svg", scale=4, border=4, dark="black", light="white")
-        return Response(written.getvalue(), media_type=SVG, headers=_NEVER_STORE)
+
+router = APIRouter(tags=["ingest"])
+_phones_of = ForEachSite(_phones)
+
+
+@router.get(
+    "/ingest/phyphox",
+    operation_id="get_phyphox_experiment",
+    summary="Get the experiment that makes the app phyphox send the motion of a tag",
+    description="Open `phyphox://HOST/api/v1/ingest/phyphox?token=KEY` on the phone. The file holds the key.",
+    response_class=Response,
+    responses=_file(MEDIA_TYPE, "The experiment.") | problems(Kind.INVALID_REQUEST),
+)
+async def get_phyphox_experiment(request: Request, query: Annotated[OfApp, Query()]) -> Response:
+    tag = tag_of(request, query)
+    content = experiment(_address(request), tag, secret_of(request))
+    named = {"content-disposition": 'attachment; filename="tag.phyphox"'}
+    return Response(content, media_type=MEDIA_TYPE, headers=_NEVER_STORE | named)
+
+
+@router.get(
+    "/ingest/phyphox/code",
+    operation_id="get_phyphox_code",
+    summary="Get the QR code that the app phyphox scans to load the experiment of a tag",
+    response_class=Response,
+    responses=_file(SVG, "The QR code.") | problems(Kind.INVALID_REQUEST),
+)
+async def get_phyphox_code(request: Request, query: Annotated[OfTag, Query()]) -> Response:
+    link = link_of(_address(request), tag_of(request, query), secret_of(request))
+    written = io.BytesIO()
+    segno.make(link, error="l").save(written, kind="svg", scale=4, border=4, dark="black", light="white")
+    return Response(written.getvalue(), media_type=SVG, headers=_NEVER_STORE)
 
 
 def _address(request: Request) -> str:
@@ -87,35 +88,30 @@ def _address(request: Request) -> str:
     return f"{str(request.base_url).rstrip('/')}{prefix_of(request)}{path}"
 
 
-def _file(media_type: str, description: str) -> dict[int | str, dict[str, Any]]:
-    return {200: {"content": {media_type: TEXT}, "description": description}}
-
-
-def _add_readings_route(router: APIRouter, phones_of: ForEachSite[PhoneIntake[Message]]) -> None:
-    @router.post(
-        "/ingest/phyphox",
-        operation_id="ingest_phyphox",
-        summary="Send readings of a phone with the app phyphox",
-        description="The address in the experiment. Readings become IMU samples of the tag, as those of Sensor Logger "
-        "do. They are put in order by their times and used once each.",
-        response_model=PhoneReadingsReceived,
-        responses=example_response(examples.PHONE_READINGS)
-        | problems(Kind.INVALID_REQUEST, Kind.SAMPLES_REJECTED, Kind.BODY_TOO_LARGE),
-        openapi_extra={"requestBody": {"required": True, "content": {"application/json": {"schema": _BODY}}}},
-    )
-    async def ingest_phyphox(request: Request, query: Annotated[OfApp, Query()]) -> Response:
-        tag, phones, body = tag_of(request, query), phones_of(request), await request.body()
-        try:
-            outcome = await run_in_threadpool(phones.post, tag, body)
-        except PhoneTimeError as error:
-            raise ProblemError(Kind.SAMPLES_REJECTED, str(error), reason=Reason.TIME_NOT_UTC) from error
-        except PhoneError as error:
-            counted = decode_json(body)
-            reason = {"reason": counted.reason} if isinstance(counted, Rejection) else {}
-            raise ProblemError(Kind.SAMPLES_REJECTED, str(error), **reason) from error
-        if (refused := why_refused(parts_of(request), tag)) is not None:
-            raise ProblemError(Kind.SAMPLES_REJECTED, refused.detail, reason=refused.reason)
-        if outcome.waiting:
-            loop = asyncio.get_running_loop()
-            loop.call_later(WAIT_S, loop.run_in_executor, None, phones.release_overdue)
-        return json_response(asdict(outcome))
+@router.post(
+    "/ingest/phyphox",
+    operation_id="ingest_phyphox",
+    summary="Send readings of a phone with the app phyphox",
+    description="The address in the experiment. Readings become IMU samples of the tag, as those of Sensor Logger "
+    "do. They are put in order by their times and used once each.",
+    response_model=PhoneReadingsReceived,
+    responses=example_response(examples.PHONE_READINGS)
+    | problems(Kind.INVALID_REQUEST, Kind.SAMPLES_REJECTED, Kind.BODY_TOO_LARGE),
+    openapi_extra={"requestBody": {"required": True, "content": {"application/json": {"schema": _BODY}}}},
+)
+async def ingest_phyphox(request: Request, query: Annotated[OfApp, Query()]) -> Response:
+    tag, phones, body = tag_of(request, query), _phones_of(request), await request.body()
+    try:
+        outcome = await run_in_threadpool(phones.post, tag, body)
+    except PhoneTimeError as error:
+        raise ProblemError(Kind.SAMPLES_REJECTED, str(error), reason=Reason.TIME_NOT_UTC) from error
+    except PhoneError as error:
+        counted = decode_json(body)
+        reason = {"reason": counted.reason} if isinstance(counted, Rejection) else {}
+        raise ProblemError(Kind.SAMPLES_REJECTED, str(error), **reason) from error
+    if (refused := why_refused(parts_of(request), tag)) is not None:
+        raise ProblemError(Kind.SAMPLES_REJECTED, refused.detail, reason=refused.reason)
+    if outcome.waiting:
+        loop = asyncio.get_running_loop()
+        loop.call_later(WAIT_S, loop.run_in_executor, None, phones.release_overdue)
+    return json_response(asdict(outcome))

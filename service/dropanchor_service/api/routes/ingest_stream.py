@@ -208,28 +208,26 @@ class _Stream:
             )
 
 
-def ingest_stream_router() -> APIRouter:
-    """Return the router of the WebSocket. OpenAPI has no WebSockets: `reference/rest.md` describes it."""
-    router = APIRouter()
+router = APIRouter()
+"""The WebSocket. OpenAPI has no WebSockets: `reference/rest.md` describes it."""
 
-    @router.websocket("/ingest/stream")
-    async def ingest_stream(socket: WebSocket) -> None:
-        await socket.accept(PROTOCOL if PROTOCOL in _protocols(socket) else None)
-        try:
-            await _Stream(socket).serve()
-        except TooManyConnectionsError:
-            too_many = say(
-                "too_many",
-                "This key has {connections} connections: end one, or make more keys.",
-                connections=CONNECTIONS_PER_KEY,
-            )
-            await socket.close(TOO_MANY, reason_of(too_many, socket.scope))
-        except _ClosedError as end:
-            await socket.close(end.code, reason_of(end.reason, socket.scope))
-        except WebSocketDisconnect:
-            pass
 
-    return router
+@router.websocket("/ingest/stream")
+async def ingest_stream(socket: WebSocket) -> None:
+    await socket.accept(PROTOCOL if PROTOCOL in _protocols(socket) else None)
+    try:
+        await _Stream(socket).serve()
+    except TooManyConnectionsError:
+        too_many = say(
+            "too_many",
+            "This key has {connections} connections: end one, or make more keys.",
+            connections=CONNECTIONS_PER_KEY,
+        )
+        await socket.close(TOO_MANY, reason_of(too_many, socket.scope))
+    except _ClosedError as end:
+        await socket.close(end.code, reason_of(end.reason, socket.scope))
+    except WebSocketDisconnect:
+        pass
 
 
 async def _messages(socket: WebSocket) -> AsyncIterator[tuple[bytes, str]]:

@@ -23,20 +23,18 @@ _EXAMPLE = {
 }
 
 
-def north_router() -> APIRouter:
-    router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
+router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
 
-    @router.get(
-        "/site/north",
-        operation_id="get_site_north",
-        summary="Get where north is, as the tags tell it whose start and heading were told",
-        description="Nothing follows from it by itself. To apply it to all tags, put the site with `learned_rad` as "
-        "its `declination_rad` and `std_rad` as its `declination_std_rad`: tags that know north by their own start go "
-        "on, and the others start again.",
-        response_model=SiteNorth,
-        responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST),
-    )
-    async def get_site_north(request: Request) -> Response:
-        return json_response(site_north_of(answers_of(request)))
 
-    return router
+@router.get(
+    "/site/north",
+    operation_id="get_site_north",
+    summary="Get where north is, as the tags tell it whose start and heading were told",
+    description="Nothing follows from it by itself. To apply it to all tags, put the site with `learned_rad` as "
+    "its `declination_rad` and `std_rad` as its `declination_std_rad`: tags that know north by their own start go "
+    "on, and the others start again.",
+    response_model=SiteNorth,
+    responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST),
+)
+async def get_site_north(request: Request) -> Response:
+    return json_response(site_north_of(answers_of(request)))

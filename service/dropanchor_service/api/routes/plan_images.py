@@ -67,67 +67,64 @@ class UploadQuery(BaseModel):
         )
 
 
-def plan_images_router() -> APIRouter:
-    router = APIRouter(tags=["plans"])
-    _add_upload_route(router)
-    _add_image_route(router)
-    return router
+def _binary(*media_types: str) -> dict[str, Any]:
+    return dict.fromkeys(media_types, BYTES)
 
 
-def _add_upload_route(router: APIRouter) -> None:
-    reader = PlanReader()
+router = APIRouter(tags=["plans"])
+_READER = PlanReader()
 
-    @router.post(
-        "/plan-images",
-        operation_id="upload_plan_image",
-        summary="Upload the image of a floor plan",
-        description=_DESCRIPTION,
-        response_model=UploadedPlanImage,
-        status_code=201,
-        responses=example_response(examples.UPLOADED, 201)
-        | problems(Kind.PLAN_IMAGE_REFUSED, Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
-        openapi_extra={"requestBody": {"required": True, "content": _binary(*_UPLOADED)}},
+
+@router.post(
+    "/plan-images",
+    operation_id="upload_plan_image",
+    summary="Upload the image of a floor plan",
+    description=_DESCRIPTION,
+    response_model=UploadedPlanImage,
+    status_code=201,
+    responses=example_response(examples.UPLOADED, 201)
+    | problems(Kind.PLAN_IMAGE_REFUSED, Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
+    openapi_extra={"requestBody": {"required": True, "content": _binary(*_UPLOADED)}},
+)
+async def upload_plan_image(request: Request, query: Annotated[UploadQuery, Query()]) -> Response:
+    parts, content = parts_of(request), await request.body()
+    try:
+        media_type = file_type_of(content, request.headers.get("content-type", ""))
+        read = await _READER.read(content, query.to_read(media_type, parts.answers.site))
+    except RefusedError as error:
+        raise ProblemError(Kind.PLAN_IMAGE_REFUSED, said_by(error)) from error
+    with saving():
+        image = await run_in_threadpool(parts.plans.add_image, read)
+    found = read.description
+    uploaded = UploadedPlanImage(
+        image=image, pages=found.pages, placement=found.placement, note=found.note, note_phrase=found.note_phrase
     )
-    async def upload_plan_image(request: Request, query: Annotated[UploadQuery, Query()]) -> Response:
-        parts, content = parts_of(request), await request.body()
-        try:
-            media_type = file_type_of(content, request.headers.get("content-type", ""))
-            read = await reader.read(content, query.to_read(media_type, parts.answers.site))
-        except RefusedError as error:
-            raise ProblemError(Kind.PLAN_IMAGE_REFUSED, said_by(error)) from error
-        with saving():
-            image = await run_in_threadpool(parts.plans.add_image, read)
-        found = read.description
-        uploaded = UploadedPlanImage(
-            image=image, pages=found.pages, placement=found.placement, note=found.note, note_phrase=found.note_phrase
-        )
-        return json_response(uploaded.model_dump(), status=201)
+    return json_response(uploaded.model_dump(), status=201)
 
 
-def _add_image_route(router: APIRouter) -> None:
-    @router.get(
-        "/plan-images/{image}",
-        operation_id="get_plan_image",
-        summary="Get the image of a floor plan",
-        description="It never changes, so a client need not request it again.",
-        response_class=Response,
-        responses=problems(Kind.UNKNOWN_PLAN_IMAGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED)
-        | {200: {"content": _binary(*_SHOWN)}},
-        dependencies=[NO_QUERY],
-    )
-    def get_plan_image(
-        image: Annotated[
-            str, Path(pattern="^[0-9a-f]{32}$", description="Id of the image.", examples=[examples.IMAGE["id"]])
-        ],
-        request: Request,
-    ) -> Response:
-        store = parts_of(request).plans
-        known = store.image(image)
-        content = None if known is None else _content(store, known)
-        if known is None or content is None:
-            raise ProblemError(Kind.UNKNOWN_PLAN_IMAGE, say("plan_gone", "There is no such image. Upload it again."))
-        headers = _HEADERS | {"etag": f'"{known.id}"'}
-        return Response(content, media_type=known.media_type, headers=headers)
+@router.get(
+    "/plan-images/{image}",
+    operation_id="get_plan_image",
+    summary="Get the image of a floor plan",
+    description="It never changes, so a client need not request it again.",
+    response_class=Response,
+    responses=problems(Kind.UNKNOWN_PLAN_IMAGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED)
+    | {200: {"content": _binary(*_SHOWN)}},
+    dependencies=[NO_QUERY],
+)
+def get_plan_image(
+    image: Annotated[
+        str, Path(pattern="^[0-9a-f]{32}$", description="Id of the image.", examples=[examples.IMAGE["id"]])
+    ],
+    request: Request,
+) -> Response:
+    store = parts_of(request).plans
+    known = store.image(image)
+    content = None if known is None else _content(store, known)
+    if known is None or content is None:
+        raise ProblemError(Kind.UNKNOWN_PLAN_IMAGE, say("plan_gone", "There is no such image. Upload it again."))
+    headers = _HEADERS | {"etag": f'"{known.id}"'}
+    return Response(content, media_type=known.media_type, headers=headers)
 
 
 def _content(store: PlanStore, image: PlanImage) -> bytes | None:
@@ -137,7 +134,3 @@ def _content(store: PlanStore, image: PlanImage) -> bytes | None:
         raise ProblemError(
             Kind.NOT_SAVED, say("plan_unreadable", "The image cannot be read: {why}.", why=error.strerror or error)
         ) from error
-
-
-def _binary(*media_types: str) -> dict[str, Any]:
-    return dict.fromkeys(media_types, BYTES)

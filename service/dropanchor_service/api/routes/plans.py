@@ -11,12 +11,6 @@ from dropanchor_service.api.routes.parameters import NO_QUERY
 from dropanchor_service.api.routes.site_of_request import parts_of
 
 
-def plans_router() -> APIRouter:
-    router = APIRouter(tags=["plans"], dependencies=[NO_QUERY])
-    add_item_routes(router, _plans())
-    return router
-
-
 def _plans() -> Resource[Plan]:
     def check_image(plan: Plan, request: Request) -> None:
         if parts_of(request).plans.image(plan.image.id) != plan.image:
@@ -39,3 +33,7 @@ def _plans() -> Resource[Plan]:
         check=check_image,
         refusals=(Kind.IMAGE_NOT_UPLOADED,),
     )
+
+
+router = APIRouter(tags=["plans"], dependencies=[NO_QUERY])
+add_item_routes(router, _plans())

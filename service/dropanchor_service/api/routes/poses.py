@@ -56,76 +56,6 @@ class PoseOfTag(AtTime):
     format: _Format = None
 
 
-def poses_router() -> APIRouter:
-    router = APIRouter(tags=["poses"])
-    _add_pose_route(router)
-    _add_explanation_route(router)
-    _add_list_route(router)
-    return router
-
-
-def _add_pose_route(router: APIRouter) -> None:
-    async def get_pose(tag: TagId, query: Annotated[PoseOfTag, Query()], request: Request) -> Response:
-        answers = answers_of(request)
-        as_geojson = geojson.is_preferred(request, answers, query.format)
-        if query.at is None:
-            pose = _pose_of(answers, tag)
-        else:  # may read from disk
-            pose = await run_in_threadpool(_pose_at, answers, tag, query.at)
-        pose["t_utc"] = iso_utc(pose["t_ns"])
-        return _response(geojson.feature_of(pose), geojson.MEDIA_TYPE) if as_geojson else _response(pose, geojson.JSON)
-
-    router.add_api_route(
-        "/tags/{tag}/pose",
-        get_pose,
-        methods=["GET"],
-        route_class_override=PlainPose,
-        operation_id="get_pose",
-        summary="Get the latest pose of a tag, or its pose at a time",
-        response_model=TimedPose,
-        responses=_offers(examples.POSE | {"t_utc": iso_utc(examples.POSE["t_ns"])}, TimedPoseFeature)
-        | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.NO_POSE_THEN, Kind.TOO_FAR_AHEAD, *_NEGOTIATION),
-    )
-
-
-def _add_explanation_route(router: APIRouter) -> None:
-    @router.get(
-        "/tags/{tag}/explain",
-        operation_id="explain_pose",
-        summary="Explain the latest pose of a tag",
-        response_model=Explanation,
-        responses=example_response(examples.EXPLANATION)
-        | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.INVALID_REQUEST),
-    )
-    async def explain_pose(tag: TagId, query: Annotated[LastInnovations, Query()], request: Request) -> Response:
-        answers = answers_of(request)
-        explanation = explanation_of(answers, known_tag(answers, tag), query.last)
-        if explanation is None:
-            raise _no_pose_yet(answers, tag)
-        return json_response(explanation)
-
-
-def _add_list_route(router: APIRouter) -> None:
-    @router.get(
-        "/poses",
-        operation_id="list_poses",
-        summary="List the latest poses of all or selected tags",
-        response_model=PoseList,
-        responses=_offers(examples.POSE_LIST, PoseFeatureCollection) | problems(*_NEGOTIATION),
-    )
-    async def list_poses(query: Annotated[ListedPoses, Query()], request: Request) -> Response:
-        answers = answers_of(request)
-        as_geojson = geojson.is_preferred(request, answers, query.format)
-        found = [tag for tag in map(answers.tags.find, query.tags) if tag is not None]
-        tags = found if query.tags else None
-        if as_geojson:
-            return _response(geojson.collection_of(answers.pose_list(tags, query.wanted)), geojson.MEDIA_TYPE)
-        headers = {"cache-control": "no-store", "vary": "accept"}
-        return StreamingResponse(
-            in_pieces(answers.pose_list_json(tags, query.wanted)), media_type=geojson.JSON, headers=headers
-        )
-
-
 class PlainPose(APIRoute):
     """Skips FastAPI's parameter handling for a request without a query.
 
@@ -143,6 +73,74 @@ class PlainPose(APIRoute):
             return answer
 
         return handle
+
+
+def _offers(example: Answer, as_geojson: type[BaseModel]) -> dict[int | str, dict[str, Any]]:
+    features = {"schema": schema_of(as_geojson)}
+    return {200: {"content": {geojson.JSON: {"example": example}, geojson.MEDIA_TYPE: features}}}
+
+
+router = APIRouter(tags=["poses"])
+
+
+async def get_pose(tag: TagId, query: Annotated[PoseOfTag, Query()], request: Request) -> Response:
+    answers = answers_of(request)
+    as_geojson = geojson.is_preferred(request, answers, query.format)
+    if query.at is None:
+        pose = _pose_of(answers, tag)
+    else:  # may read from disk
+        pose = await run_in_threadpool(_pose_at, answers, tag, query.at)
+    pose["t_utc"] = iso_utc(pose["t_ns"])
+    return _response(geojson.feature_of(pose), geojson.MEDIA_TYPE) if as_geojson else _response(pose, geojson.JSON)
+
+
+router.add_api_route(
+    "/tags/{tag}/pose",
+    get_pose,
+    methods=["GET"],
+    route_class_override=PlainPose,
+    operation_id="get_pose",
+    summary="Get the latest pose of a tag, or its pose at a time",
+    response_model=TimedPose,
+    responses=_offers(examples.POSE | {"t_utc": iso_utc(examples.POSE["t_ns"])}, TimedPoseFeature)
+    | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.NO_POSE_THEN, Kind.TOO_FAR_AHEAD, *_NEGOTIATION),
+)
+
+
+@router.get(
+    "/tags/{tag}/explain",
+    operation_id="explain_pose",
+    summary="Explain the latest pose of a tag",
+    response_model=Explanation,
+    responses=example_response(examples.EXPLANATION)
+    | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.INVALID_REQUEST),
+)
+async def explain_pose(tag: TagId, query: Annotated[LastInnovations, Query()], request: Request) -> Response:
+    answers = answers_of(request)
+    explanation = explanation_of(answers, known_tag(answers, tag), query.last)
+    if explanation is None:
+        raise _no_pose_yet(answers, tag)
+    return json_response(explanation)
+
+
+@router.get(
+    "/poses",
+    operation_id="list_poses",
+    summary="List the latest poses of all or selected tags",
+    response_model=PoseList,
+    responses=_offers(examples.POSE_LIST, PoseFeatureCollection) | problems(*_NEGOTIATION),
+)
+async def list_poses(query: Annotated[ListedPoses, Query()], request: Request) -> Response:
+    answers = answers_of(request)
+    as_geojson = geojson.is_preferred(request, answers, query.format)
+    found = [tag for tag in map(answers.tags.find, query.tags) if tag is not None]
+    tags = found if query.tags else None
+    if as_geojson:
+        return _response(geojson.collection_of(answers.pose_list(tags, query.wanted)), geojson.MEDIA_TYPE)
+    headers = {"cache-control": "no-store", "vary": "accept"}
+    return StreamingResponse(
+        in_pieces(answers.pose_list_json(tags, query.wanted)), media_type=geojson.JSON, headers=headers
+    )
 
 
 async def in_pieces(chunks: Iterator[bytes | memoryview]) -> AsyncIterator[bytes | memoryview]:
@@ -183,8 +181,3 @@ def _response(answer: Answer, media_type: str) -> Response:
     response = json_response(answer, media_type)
     response.headers["vary"] = "accept"
     return response
-
-
-def _offers(example: Answer, as_geojson: type[BaseModel]) -> dict[int | str, dict[str, Any]]:
-    features = {"schema": schema_of(as_geojson)}
-    return {200: {"content": {geojson.JSON: {"example": example}, geojson.MEDIA_TYPE: features}}}

@@ -38,71 +38,63 @@ def _network(
 NetworkInPath = Annotated[str, Depends(_network)]
 
 
-def receiver_networks_router() -> APIRouter:
-    router = APIRouter(tags=["destinations"], dependencies=[NO_QUERY])
-    _add_list_route(router)
-    _add_allow_route(router)
-    _add_remove_route(router)
-    return router
+router = APIRouter(tags=["destinations"], dependencies=[NO_QUERY])
 
 
-def _add_list_route(router: APIRouter) -> None:
-    @router.get(
-        "/receiver-networks",
-        operation_id="list_receiver_networks",
-        summary="List the networks inside whose machines may receive events",
-        response_model=ReceiverNetworkList,
-        responses=example_response({"networks": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
-    )
-    def list_networks(request: Request) -> Response:
-        networks = parts_of(request).events.channels.networks
-        of_settings = [ReceiverNetwork(network=str(one), in_settings=True) for one in networks.of_settings]
-        of_page = [ReceiverNetwork(network=one, in_settings=False) for one in networks.items.all]
-        return json_response({"networks": [one.model_dump() for one in (*of_settings, *of_page)]})
+@router.get(
+    "/receiver-networks",
+    operation_id="list_receiver_networks",
+    summary="List the networks inside whose machines may receive events",
+    response_model=ReceiverNetworkList,
+    responses=example_response({"networks": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
+)
+def list_networks(request: Request) -> Response:
+    networks = parts_of(request).events.channels.networks
+    of_settings = [ReceiverNetwork(network=str(one), in_settings=True) for one in networks.of_settings]
+    of_page = [ReceiverNetwork(network=one, in_settings=False) for one in networks.items.all]
+    return json_response({"networks": [one.model_dump() for one in (*of_settings, *of_page)]})
 
 
-def _add_allow_route(router: APIRouter) -> None:
-    @router.put(
-        "/receiver-networks/{network}",
-        operation_id="allow_receiver_network",
-        summary="Allow the machines of a network to receive events",
-        description=_DESCRIPTION,
-        response_model=ReceiverNetwork,
-        responses=example_response(_EXAMPLE)
-        | problems(Kind.NO_ACCESS_CONTROL, Kind.ITEMS_FULL, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
-    )
-    def allow_network(network: NetworkInPath, request: Request) -> Response:
-        items = parts_of(request).events.channels.networks.items
-        _refuse_anybody(request)
-        with saving():
-            try:
-                items.put(network, AllowedNetwork(network=network))
-            except FullError as error:
-                raise ProblemError(
-                    Kind.ITEMS_FULL, say("items_full", "There are {n} already. Delete one first.", n=len(items.all))
-                ) from error
-        return json_response({"network": network, "in_settings": False})
+@router.put(
+    "/receiver-networks/{network}",
+    operation_id="allow_receiver_network",
+    summary="Allow the machines of a network to receive events",
+    description=_DESCRIPTION,
+    response_model=ReceiverNetwork,
+    responses=example_response(_EXAMPLE)
+    | problems(Kind.NO_ACCESS_CONTROL, Kind.ITEMS_FULL, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
+)
+def allow_network(network: NetworkInPath, request: Request) -> Response:
+    items = parts_of(request).events.channels.networks.items
+    _refuse_anybody(request)
+    with saving():
+        try:
+            items.put(network, AllowedNetwork(network=network))
+        except FullError as error:
+            raise ProblemError(
+                Kind.ITEMS_FULL, say("items_full", "There are {n} already. Delete one first.", n=len(items.all))
+            ) from error
+    return json_response({"network": network, "in_settings": False})
 
 
-def _add_remove_route(router: APIRouter) -> None:
-    @router.delete(
-        "/receiver-networks/{network}",
-        operation_id="remove_receiver_network",
-        summary="Allow a network no longer",
-        description="The next event is not sent there, unless the settings allow the network, too.",
-        status_code=204,
-        responses=problems(Kind.UNKNOWN_NETWORK, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
-    )
-    def remove_network(network: NetworkInPath, request: Request) -> Response:
-        items = parts_of(request).events.channels.networks.items
-        with saving():
-            try:
-                items.remove(network)
-            except KeyError as error:
-                raise ProblemError(
-                    Kind.UNKNOWN_NETWORK, say("network_unknown", "The page does not allow {network}.", network=network)
-                ) from error
-        return Response(status_code=204)
+@router.delete(
+    "/receiver-networks/{network}",
+    operation_id="remove_receiver_network",
+    summary="Allow a network no longer",
+    description="The next event is not sent there, unless the settings allow the network, too.",
+    status_code=204,
+    responses=problems(Kind.UNKNOWN_NETWORK, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
+)
+def remove_network(network: NetworkInPath, request: Request) -> Response:
+    items = parts_of(request).events.channels.networks.items
+    with saving():
+        try:
+            items.remove(network)
+        except KeyError as error:
+            raise ProblemError(
+                Kind.UNKNOWN_NETWORK, say("network_unknown", "The page does not allow {network}.", network=network)
+            ) from error
+    return Response(status_code=204)
 
 
 def _refuse_anybody(request: Request) -> None:

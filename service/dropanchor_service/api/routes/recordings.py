@@ -27,86 +27,76 @@ FileName = Annotated[
 ]
 
 
-def recordings_router() -> APIRouter:
-    router = APIRouter(tags=["recordings"], dependencies=[NO_QUERY])
-    _add_list_route(router)
-    _add_start_route(router)
-    _add_stop_route(router)
-    _add_download_route(router)
-    return router
+def _file() -> dict[int | str, dict[str, Any]]:
+    return {200: {"content": {MEDIA_TYPE: BYTES}}}
 
 
-def _add_list_route(router: APIRouter) -> None:
-    @router.get(
-        "/recordings",
-        operation_id="list_recordings",
-        summary="Get the state of the recorder and the list of files",
-        response_model=RecordingList,
-        responses=example_response(examples.RECORDINGS) | problems(Kind.NO_RECORDER, Kind.INVALID_REQUEST),
-    )
-    def list_recordings(request: Request) -> Response:
-        found = _required(request)
-        files = [
-            {"name": file.name, "bytes": file.size, "changed_ns": file.changed_ns, "finished": file.finished}
-            for file in found.files()
-        ]
-        return json_response(_state(found) | {"files": files})
+router = APIRouter(tags=["recordings"], dependencies=[NO_QUERY])
 
 
-def _add_start_route(router: APIRouter) -> None:
-    @router.post(
-        "/recordings",
-        operation_id="start_recording",
-        summary="Start a recording of raw samples and poses",
-        status_code=201,
-        response_model=RecordingState,
-        responses=example_response(examples.RECORDING, 201)
-        | problems(
-            *(Kind.NO_RECORDER, Kind.RECORDS_ALREADY, Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED)
-        ),
-    )
-    def start_recording(
-        wanted: Annotated[RecordingRequest, Body(examples=[{"tags": None}])], request: Request
-    ) -> Response:
-        found = _required(request)
-        with saving():
-            found.prepare()
-        if not found.start(wanted.tags):
-            raise ProblemError(
-                Kind.RECORDS_ALREADY, "A recording is running. Stop it first with POST /api/v1/recordings/stop."
-            )
-        return json_response(_state(found), status=201)
+@router.get(
+    "/recordings",
+    operation_id="list_recordings",
+    summary="Get the state of the recorder and the list of files",
+    response_model=RecordingList,
+    responses=example_response(examples.RECORDINGS) | problems(Kind.NO_RECORDER, Kind.INVALID_REQUEST),
+)
+def list_recordings(request: Request) -> Response:
+    found = _required(request)
+    files = [
+        {"name": file.name, "bytes": file.size, "changed_ns": file.changed_ns, "finished": file.finished}
+        for file in found.files()
+    ]
+    return json_response(_state(found) | {"files": files})
 
 
-def _add_stop_route(router: APIRouter) -> None:
-    @router.post(
-        "/recordings/stop",
-        operation_id="stop_recording",
-        summary="Stop the recording",
-        response_model=RecordingState,
-        description="The answer names the last `file`. It comes when the file is finished, at the latest after 10 s.",
-        responses=example_response(examples.NO_RECORDING)
-        | problems(Kind.NO_RECORDER, Kind.RECORDS_NOTHING, Kind.INVALID_REQUEST),
-    )
-    def stop_recording(request: Request) -> Response:
-        found = _required(request)
-        if not found.stop(FINISH_S):
-            raise ProblemError(Kind.RECORDS_NOTHING, "No recording is running, so there is nothing to stop.")
-        return json_response(_state(found) | {"file": found.open_name or found.ended_name})
+@router.post(
+    "/recordings",
+    operation_id="start_recording",
+    summary="Start a recording of raw samples and poses",
+    status_code=201,
+    response_model=RecordingState,
+    responses=example_response(examples.RECORDING, 201)
+    | problems(*(Kind.NO_RECORDER, Kind.RECORDS_ALREADY, Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED)),
+)
+def start_recording(wanted: Annotated[RecordingRequest, Body(examples=[{"tags": None}])], request: Request) -> Response:
+    found = _required(request)
+    with saving():
+        found.prepare()
+    if not found.start(wanted.tags):
+        raise ProblemError(
+            Kind.RECORDS_ALREADY, "A recording is running. Stop it first with POST /api/v1/recordings/stop."
+        )
+    return json_response(_state(found), status=201)
 
 
-def _add_download_route(router: APIRouter) -> None:
-    @router.get(
-        "/recordings/{name}",
-        operation_id="get_recording",
-        summary="Download a recording, to replay it or to open it in Foxglove or Lichtblick",
-        response_class=StreamingResponse,
-        description="The file of a running recording comes up to where it is, without its index.",
-        responses=_file()
-        | problems(Kind.NO_RECORDER, Kind.UNKNOWN_RECORDING, Kind.RECORDING_UNFINISHED, Kind.INVALID_REQUEST),
-    )
-    def get_recording(name: FileName, request: Request) -> Response:
-        return _download(_opened(_required(request), name), name)
+@router.post(
+    "/recordings/stop",
+    operation_id="stop_recording",
+    summary="Stop the recording",
+    response_model=RecordingState,
+    description="The answer names the last `file`. It comes when the file is finished, at the latest after 10 s.",
+    responses=example_response(examples.NO_RECORDING)
+    | problems(Kind.NO_RECORDER, Kind.RECORDS_NOTHING, Kind.INVALID_REQUEST),
+)
+def stop_recording(request: Request) -> Response:
+    found = _required(request)
+    if not found.stop(FINISH_S):
+        raise ProblemError(Kind.RECORDS_NOTHING, "No recording is running, so there is nothing to stop.")
+    return json_response(_state(found) | {"file": found.open_name or found.ended_name})
+
+
+@router.get(
+    "/recordings/{name}",
+    operation_id="get_recording",
+    summary="Download a recording, to replay it or to open it in Foxglove or Lichtblick",
+    response_class=StreamingResponse,
+    description="The file of a running recording comes up to where it is, without its index.",
+    responses=_file()
+    | problems(Kind.NO_RECORDER, Kind.UNKNOWN_RECORDING, Kind.RECORDING_UNFINISHED, Kind.INVALID_REQUEST),
+)
+def get_recording(name: FileName, request: Request) -> Response:
+    return _download(_opened(_required(request), name), name)
 
 
 def _opened(recorder: Recorder, name: str) -> BinaryIO:
@@ -156,7 +146,3 @@ def _state(recorder: Recorder) -> dict[str, Any]:
         return {"recording": False, "since_ns": None, "tags": None, "file": recorder.open_name}
     tags = None if running.tags is None else list(running.tags)
     return {"recording": True, "since_ns": running.since_ns, "tags": tags, "file": recorder.open_name}
-
-
-def _file() -> dict[int | str, dict[str, Any]]:
-    return {200: {"content": {MEDIA_TYPE: BYTES}}}

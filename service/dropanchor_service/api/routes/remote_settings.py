@@ -31,49 +31,43 @@ _PATCH = {
 }
 
 
-def remote_settings_router() -> APIRouter:
-    router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
-    _add_get_route(router)
-    _add_patch_route(router)
-    return router
+router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
 
 
-def _add_get_route(router: APIRouter) -> None:
-    @router.get(
-        "/tags/{tag}/remote-settings",
-        operation_id="get_remote_settings",
-        summary="Get what is set in the program of a tag, and what the program applies",
-        response_model=RemoteSettingsStatus,
-        responses=example_response(examples.REMOTE_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
-    )
-    async def get_remote_settings(tag: TagId, request: Request) -> Response:
-        answers = answers_of(request)
-        return _response(answers, known_tag(answers, tag))
+@router.get(
+    "/tags/{tag}/remote-settings",
+    operation_id="get_remote_settings",
+    summary="Get what is set in the program of a tag, and what the program applies",
+    response_model=RemoteSettingsStatus,
+    responses=example_response(examples.REMOTE_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
+)
+async def get_remote_settings(tag: TagId, request: Request) -> Response:
+    answers = answers_of(request)
+    return _response(answers, known_tag(answers, tag))
 
 
-def _add_patch_route(router: APIRouter) -> None:
-    @router.patch(
-        "/tags/{tag}/remote-settings",
-        operation_id="patch_remote_settings",
-        summary="Set values in the program of a tag",
-        description="The values in the body replace the current ones, the others stay; null leaves a value to the "
-        "program. The program gets them over Zenoh at once, or when it is connected. With `If-Match`, nothing changes "
-        "unless it is the `ETag` of the current values.",
-        response_model=RemoteSettingsStatus,
-        responses=example_response(examples.REMOTE_SETTINGS)
-        | problems(Kind.UNKNOWN_TAG, Kind.CHANGED_MEANWHILE, Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
-        openapi_extra=_PATCH,
-    )
-    def patch_remote_settings(
-        tag: TagId,
-        patch: Annotated[dict[str, Any], Body()],
-        request: Request,
-        if_match: Annotated[str | None, Header()] = None,
-    ) -> Response:
-        answers = answers_of(request)
-        known = known_tag(answers, tag)
-        _change(answers, known, patch, if_match)
-        return _response(answers, known)
+@router.patch(
+    "/tags/{tag}/remote-settings",
+    operation_id="patch_remote_settings",
+    summary="Set values in the program of a tag",
+    description="The values in the body replace the current ones, the others stay; null leaves a value to the "
+    "program. The program gets them over Zenoh at once, or when it is connected. With `If-Match`, nothing changes "
+    "unless it is the `ETag` of the current values.",
+    response_model=RemoteSettingsStatus,
+    responses=example_response(examples.REMOTE_SETTINGS)
+    | problems(Kind.UNKNOWN_TAG, Kind.CHANGED_MEANWHILE, Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
+    openapi_extra=_PATCH,
+)
+def patch_remote_settings(
+    tag: TagId,
+    patch: Annotated[dict[str, Any], Body()],
+    request: Request,
+    if_match: Annotated[str | None, Header()] = None,
+) -> Response:
+    answers = answers_of(request)
+    known = known_tag(answers, tag)
+    _change(answers, known, patch, if_match)
+    return _response(answers, known)
 
 
 def _change(answers: Answers, tag: Tag, patch: dict[str, Any], if_match: str | None) -> None:

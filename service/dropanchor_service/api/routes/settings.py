@@ -46,21 +46,19 @@ class SettingsQuery(BaseModel):
     limit: int = Field(default=1000, ge=1, le=100_000, description="Return at most this many values.")
 
 
-def settings_router() -> APIRouter:
-    router = APIRouter(tags=["site"])
+router = APIRouter(tags=["site"])
 
-    @router.get(
-        "/settings",
-        operation_id="list_settings",
-        summary="List the values of settings, where they come from and what they hide",
-        description=_DESCRIPTION,
-        response_model=SettingValueList,
-        responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST),
-    )
-    def list_settings(query: Annotated[SettingsQuery, Query()], request: Request) -> Response:
-        values = values_of_site(answers_of(request).site)
-        wanted = [value for value in values if not query.source or value.source in query.source]
-        answer = {"values": [value.model_dump() for value in wanted[: query.limit]], "total": len(wanted)}
-        return json_response(answer)
 
-    return router
+@router.get(
+    "/settings",
+    operation_id="list_settings",
+    summary="List the values of settings, where they come from and what they hide",
+    description=_DESCRIPTION,
+    response_model=SettingValueList,
+    responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST),
+)
+def list_settings(query: Annotated[SettingsQuery, Query()], request: Request) -> Response:
+    values = values_of_site(answers_of(request).site)
+    wanted = [value for value in values if not query.source or value.source in query.source]
+    answer = {"values": [value.model_dump() for value in wanted[: query.limit]], "total": len(wanted)}
+    return json_response(answer)

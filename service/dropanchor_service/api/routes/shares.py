@@ -33,59 +33,48 @@ scope `read`. A link of a tag or a group reads these tags, the site and nothing 
 in its data folder."""
 
 
-def shares_router() -> APIRouter:
-    router = APIRouter(tags=["shares"], dependencies=[NO_QUERY])
-    _add_list_route(router)
-    _add_create_route(router)
-    _add_revoke_route(router)
-    return router
+router = APIRouter(tags=["shares"], dependencies=[NO_QUERY])
 
 
-def _add_list_route(router: APIRouter) -> None:
-    @router.get(
-        "/shares",
-        operation_id="list_shares",
-        summary="List the share links",
-        response_model=ShareList,
-        responses=example_response({"available": True, "shares": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
-    )
-    async def list_shares(request: Request) -> Response:
-        site, links = parts_of(request).id, _links_of(request)
-        shares: Sequence[Share] = [] if links is None else links.of_site(site)
-        available = links is not None and links.can_change
-        return json_response({"available": available, "shares": [share.model_dump() for share in shares]})
+@router.get(
+    "/shares",
+    operation_id="list_shares",
+    summary="List the share links",
+    response_model=ShareList,
+    responses=example_response({"available": True, "shares": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
+)
+async def list_shares(request: Request) -> Response:
+    site, links = parts_of(request).id, _links_of(request)
+    shares: Sequence[Share] = [] if links is None else links.of_site(site)
+    available = links is not None and links.can_change
+    return json_response({"available": available, "shares": [share.model_dump() for share in shares]})
 
 
-def _add_create_route(router: APIRouter) -> None:
-    @router.post(
-        "/shares",
-        operation_id="create_share",
-        summary="Create a share link",
-        description=_DESCRIPTION,
-        status_code=201,
-        response_model=NewShare,
-        responses=example_response(_EXAMPLE | {"secret": _SECRET, "path": f"/#group=forklifts&share={_SECRET}"}, 201)
-        | problems(Kind.NO_ACCESS_CONTROL, Kind.ITEMS_FULL, Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED),
-    )
-    def create_share(
-        body: Annotated[ShareRequest, Body(examples=[{"name": "Visitors"}])], request: Request
-    ) -> Response:
-        site, links = parts_of(request).id, _links_of(request)
-        if links is None:
-            raise _no_access_control()
-        try:
-            with saving(), trail_of(request).changing(Change("share", "", None, None)) as change:
-                share, secret = links.add(site, body)
-                change.item, change.after = share.id, share
-        except TooManyLinksError as error:
-            raise ProblemError(
-                Kind.ITEMS_FULL, say("shares_full", "There are {n} share links: revoke some.", n=MAX_LINKS)
-            ) from error
-        page = prefix_of(request) + ("/" if sites_of(request).only else f"/?site={quote(site, safe='')}")
-        view = f"{body.view}&" if body.view else ""
-        return json_response(
-            share.model_dump() | {"secret": secret, "path": f"{page}#{view}share={secret}"}, status=201
-        )
+@router.post(
+    "/shares",
+    operation_id="create_share",
+    summary="Create a share link",
+    description=_DESCRIPTION,
+    status_code=201,
+    response_model=NewShare,
+    responses=example_response(_EXAMPLE | {"secret": _SECRET, "path": f"/#group=forklifts&share={_SECRET}"}, 201)
+    | problems(Kind.NO_ACCESS_CONTROL, Kind.ITEMS_FULL, Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED),
+)
+def create_share(body: Annotated[ShareRequest, Body(examples=[{"name": "Visitors"}])], request: Request) -> Response:
+    site, links = parts_of(request).id, _links_of(request)
+    if links is None:
+        raise _no_access_control()
+    try:
+        with saving(), trail_of(request).changing(Change("share", "", None, None)) as change:
+            share, secret = links.add(site, body)
+            change.item, change.after = share.id, share
+    except TooManyLinksError as error:
+        raise ProblemError(
+            Kind.ITEMS_FULL, say("shares_full", "There are {n} share links: revoke some.", n=MAX_LINKS)
+        ) from error
+    page = prefix_of(request) + ("/" if sites_of(request).only else f"/?site={quote(site, safe='')}")
+    view = f"{body.view}&" if body.view else ""
+    return json_response(share.model_dump() | {"secret": secret, "path": f"{page}#{view}share={secret}"}, status=201)
 
 
 def _links_of(request: Request) -> ShareLinks | None:
@@ -104,22 +93,21 @@ def _no_access_control() -> ProblemError:
     )
 
 
-def _add_revoke_route(router: APIRouter) -> None:
-    @router.delete(
-        "/shares/{share}",
-        operation_id="revoke_share",
-        summary="Revoke a share link, which ends its streams",
-        status_code=204,
-        responses=problems(Kind.UNKNOWN_SHARE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
-    )
-    def revoke_share(
-        share: Annotated[str, Path(description="The id of the link.", examples=[_EXAMPLE["id"]])], request: Request
-    ) -> None:
-        site, links = parts_of(request).id, _links_of(request)
-        known = None if links is None else next((one for one in links.of_site(site) if one.id == share), None)
-        with saving(), trail_of(request).changing(Change("share", share, known, None)):
-            if links is None or not links.revoke(site, share):
-                raise ProblemError(
-                    Kind.UNKNOWN_SHARE,
-                    say("share_unknown", "There is no such share link. GET /api/v1/shares lists them."),
-                )
+@router.delete(
+    "/shares/{share}",
+    operation_id="revoke_share",
+    summary="Revoke a share link, which ends its streams",
+    status_code=204,
+    responses=problems(Kind.UNKNOWN_SHARE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
+)
+def revoke_share(
+    share: Annotated[str, Path(description="The id of the link.", examples=[_EXAMPLE["id"]])], request: Request
+) -> None:
+    site, links = parts_of(request).id, _links_of(request)
+    known = None if links is None else next((one for one in links.of_site(site) if one.id == share), None)
+    with saving(), trail_of(request).changing(Change("share", share, known, None)):
+        if links is None or not links.revoke(site, share):
+            raise ProblemError(
+                Kind.UNKNOWN_SHARE,
+                say("share_unknown", "There is no such share link. GET /api/v1/shares lists them."),
+            )

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from fastapi.routing import APIRoute
 from starlette.responses import Response, StreamingResponse
+from starlette.routing import BaseRoute
 
 from dropanchor_schemas.answers import SiteList
 from dropanchor_schemas.pose import SitePosesList
@@ -22,19 +23,17 @@ from dropanchor_service.api.routes.site_of_request import SITE_IN_PATH, SITE_PRE
 from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.security.identity import Scope
 
+router = APIRouter()
 
-def sites_router(routers: Iterable[APIRouter]) -> APIRouter:
-    """Return the list of the sites, and below the id of each site the routes of these routers."""
-    router = APIRouter()
-    _add_list_route(router)
-    _add_poses_route(router)
+
+def routes_of_sites(routers: Iterable[APIRouter]) -> Iterator[BaseRoute]:
+    """Yield the list of the sites, and below the id of each site the routes of these routers."""
+    yield from router.routes
     for routes in routers:
-        of_site = below(SITE_PREFIX, routes.routes)
-        for route in of_site:
+        for route in below(SITE_PREFIX, routes.routes):
             if isinstance(route, APIRoute):
                 _describe(route)
-        router.routes.extend(of_site)
-    return router
+            yield route
 
 
 def _describe(route: APIRoute) -> None:
@@ -53,36 +52,31 @@ def _with_unknown_site(responses: dict[int | str, dict[str, Any]]) -> dict[int |
     return responses | {404: unknown | {"description": f"{unknown['description']} {others}".rstrip()}}
 
 
-def _add_list_route(router: APIRouter) -> None:
-    @router.get(
-        "/sites",
-        operation_id="list_sites",
-        summary="List the sites of the service",
-        tags=["site"],
-        response_model=SiteList,
-        responses=example_response(examples.SITE_LIST) | problems(Kind.INVALID_REQUEST),
-        dependencies=[NO_QUERY],
-    )
-    def list_sites(request: Request) -> Response:
-        wanted = {one.id for one in _readable(request)}
-        return json_response({"sites": list(summaries([one.answers for one in sites_of(request)], wanted))})
+@router.get(
+    "/sites",
+    operation_id="list_sites",
+    summary="List the sites of the service",
+    tags=["site"],
+    response_model=SiteList,
+    responses=example_response(examples.SITE_LIST) | problems(Kind.INVALID_REQUEST),
+    dependencies=[NO_QUERY],
+)
+def list_sites(request: Request) -> Response:
+    wanted = {one.id for one in _readable(request)}
+    return json_response({"sites": list(summaries([one.answers for one in sites_of(request)], wanted))})
 
 
-def _add_poses_route(router: APIRouter) -> None:
-    @router.get(
-        "/sites/poses",
-        operation_id="list_poses_of_sites",
-        summary="List the latest poses of the tags of all sites",
-        tags=["poses"],
-        response_model=SitePosesList,
-        responses=example_response({"sites": [{"site": "default", **examples.POSE_LIST}]})
-        | problems(Kind.INVALID_REQUEST),
-    )
-    async def list_poses_of_sites(query: Annotated[PoseQuery, Query()], request: Request) -> Response:
-        chunks = _poses_json(_readable(request), query)
-        return StreamingResponse(
-            in_pieces(chunks), media_type="application/json", headers={"cache-control": "no-store"}
-        )
+@router.get(
+    "/sites/poses",
+    operation_id="list_poses_of_sites",
+    summary="List the latest poses of the tags of all sites",
+    tags=["poses"],
+    response_model=SitePosesList,
+    responses=example_response({"sites": [{"site": "default", **examples.POSE_LIST}]}) | problems(Kind.INVALID_REQUEST),
+)
+async def list_poses_of_sites(query: Annotated[PoseQuery, Query()], request: Request) -> Response:
+    chunks = _poses_json(_readable(request), query)
+    return StreamingResponse(in_pieces(chunks), media_type="application/json", headers={"cache-control": "no-store"})
 
 
 def _readable(request: Request) -> list[SiteParts]:

@@ -49,26 +49,33 @@ Versions = Callable[[], Sequence[int]]
 """Returns numbers of which one grows with every change of settings."""
 
 
-def stream_router() -> APIRouter:
-    router = APIRouter(tags=["poses"])
+def _event_stream() -> dict[int | str, dict[str, Any]]:
+    example = (_event("snapshot", examples.POSE_FRAME) + b": alive\n\n").decode()
+    return {200: {"content": {MEDIA_TYPE: {"example": example}}}}
 
-    @router.get(
-        "/stream",
-        operation_id="stream_poses",
-        summary="Stream poses as they change",
-        description=_DESCRIPTION,
-        response_class=StreamingResponse,
-        responses=_event_stream() | problems(Kind.INVALID_REQUEST),
-    )
-    async def stream_poses(query: Annotated[StreamQuery, Query()], request: Request) -> Response:
-        parts = parts_of(request)
-        answers, plans = parts.answers, parts.plans
-        changes = Changes(answers, lambda: (answers.site.version, plans.version), query.tags, query.wanted)
-        events = _events(changes, 1 / query.max_hz, shared_of(request).stopping)
-        headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
-        return StreamingResponse(events, media_type=MEDIA_TYPE, headers=headers)
 
-    return router
+def _event(name: str, frame: Answer) -> bytes:
+    return b"event: " + name.encode() + b"\ndata: " + to_json(frame) + b"\n\n"
+
+
+router = APIRouter(tags=["poses"])
+
+
+@router.get(
+    "/stream",
+    operation_id="stream_poses",
+    summary="Stream poses as they change",
+    description=_DESCRIPTION,
+    response_class=StreamingResponse,
+    responses=_event_stream() | problems(Kind.INVALID_REQUEST),
+)
+async def stream_poses(query: Annotated[StreamQuery, Query()], request: Request) -> Response:
+    parts = parts_of(request)
+    answers, plans = parts.answers, parts.plans
+    changes = Changes(answers, lambda: (answers.site.version, plans.version), query.tags, query.wanted)
+    events = _events(changes, 1 / query.max_hz, shared_of(request).stopping)
+    headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
+    return StreamingResponse(events, media_type=MEDIA_TYPE, headers=headers)
 
 
 class Changes:
@@ -164,12 +171,3 @@ async def stopped_within(period_s: float, stopping: Event) -> bool:
             return False
         await asyncio.sleep(min(left_s, _NAP_S))
     return True
-
-
-def _event(name: str, frame: Answer) -> bytes:
-    return b"event: " + name.encode() + b"\ndata: " + to_json(frame) + b"\n\n"
-
-
-def _event_stream() -> dict[int | str, dict[str, Any]]:
-    example = (_event("snapshot", examples.POSE_FRAME) + b": alive\n\n").decode()
-    return {200: {"content": {MEDIA_TYPE: {"example": example}}}}

@@ -35,140 +35,131 @@ from dropanchor_service.store.tags import KINDS, REASONS, Tag
 _REASON_NAMES = [reason.value for reason in REASONS]
 
 
-def tags_router() -> APIRouter:
-    router = APIRouter(tags=["tags"])
-    _add_list_route(router)
-    return router
+def _timed(status: Answer) -> Answer:
+    """Return the `TimedTagStatus` of a `TagStatus`."""
+    times = {name: status[f"{name}_ns"] for name in ("first_heard", "last_heard")}
+    return status | {f"{name}_utc": None if t_ns is None else iso_utc(t_ns) for name, t_ns in times.items()}
 
 
-def tag_router() -> APIRouter:
-    router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
-    _add_pending_routes(router)
-    _add_status_route(router)
-    _add_get_settings_route(router)
-    _add_put_settings_route(router)
-    _add_delete_route(router)
-    return router
+router_of_all = APIRouter(tags=["tags"])
 
 
-def _add_list_route(router: APIRouter) -> None:
-    @router.get(
-        "/tags",
-        operation_id="list_tags",
-        summary="List all tags that have sent messages or been configured",
-        response_model=TagList,
-        responses=example_response(examples.TAG_LIST) | problems(Kind.INVALID_REQUEST),
-    )
-    def list_tags(query: Annotated[TagFilter, Query()], request: Request) -> Response:
-        answers = answers_of(request)
-        now_ns = answers.now_ns()
-        offsets = answers.clock_offsets.clock_offsets(now_ns)
-        wanted = set(query.tags)
-        tags = [tag for tag in answers.tags.listed() if not wanted or tag.name in wanted]
-        show = shown_to(request)
-        return json_response({"t_ns": now_ns, "tags": list(map(show, _statuses(answers, tags, offsets, now_ns)))})
+router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
 
 
-def _add_pending_routes(router: APIRouter) -> None:
-    @router.get(
-        "/pending-tags",
-        operation_id="list_pending_tags",
-        summary="List tags that have sent messages but are not admitted yet",
-        description='With `unknown_tags = "quarantine"`, a tag stays in this list until you put its settings (`{}` is '
-        "enough). With `accept`, a tag stays only while many tags are new at once, until its second message. The list "
-        "holds up to `max_tags` tags, those that sent most recently. A restart clears it.",
-        response_model=PendingTagList,
-        responses=example_response(examples.PENDING_TAG_LIST) | problems(Kind.INVALID_REQUEST),
-    )
-    def list_pending_tags(request: Request) -> Response:
-        answers = answers_of(request)
-        return json_response({"t_ns": answers.now_ns(), "tags": _pending(answers)})
-
-    @router.get(
-        "/newcomers",
-        operation_id="list_newcomers",
-        summary="The former name of /pending-tags, until the next version",
-        deprecated=True,
-        response_model=NewcomerList,
-        responses=example_response(examples.NEWCOMER_LIST) | problems(Kind.INVALID_REQUEST),
-    )
-    def list_newcomers(request: Request) -> Response:
-        answers = answers_of(request)
-        return json_response({"t_ns": answers.now_ns(), "newcomers": _pending(answers)})
+@router_of_all.get(
+    "/tags",
+    operation_id="list_tags",
+    summary="List all tags that have sent messages or been configured",
+    response_model=TagList,
+    responses=example_response(examples.TAG_LIST) | problems(Kind.INVALID_REQUEST),
+)
+def list_tags(query: Annotated[TagFilter, Query()], request: Request) -> Response:
+    answers = answers_of(request)
+    now_ns = answers.now_ns()
+    offsets = answers.clock_offsets.clock_offsets(now_ns)
+    wanted = set(query.tags)
+    tags = [tag for tag in answers.tags.listed() if not wanted or tag.name in wanted]
+    show = shown_to(request)
+    return json_response({"t_ns": now_ns, "tags": list(map(show, _statuses(answers, tags, offsets, now_ns)))})
 
 
-def _add_status_route(router: APIRouter) -> None:
-    @router.get(
-        "/tags/{tag}",
-        operation_id="get_tag",
-        summary="Get a tag",
-        response_model=TimedTagStatus,
-        responses=example_response(_timed(examples.TAG)) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
-    )
-    async def get_tag(tag: TagId, request: Request) -> Response:
-        answers = answers_of(request)
-        known, now_ns = known_tag(answers, tag), answers.now_ns()
-        offset = answers.clock_offsets.clock_offset(known.row, now_ns)
-        status = next(_statuses(answers, [known], {known.row: offset}, now_ns))
-        return json_response(_timed(shown_to(request)(status)))
+@router.get(
+    "/pending-tags",
+    operation_id="list_pending_tags",
+    summary="List tags that have sent messages but are not admitted yet",
+    description='With `unknown_tags = "quarantine"`, a tag stays in this list until you put its settings (`{}` is '
+    "enough). With `accept`, a tag stays only while many tags are new at once, until its second message. The list "
+    "holds up to `max_tags` tags, those that sent most recently. A restart clears it.",
+    response_model=PendingTagList,
+    responses=example_response(examples.PENDING_TAG_LIST) | problems(Kind.INVALID_REQUEST),
+)
+def list_pending_tags(request: Request) -> Response:
+    answers = answers_of(request)
+    return json_response({"t_ns": answers.now_ns(), "tags": _pending(answers)})
 
 
-def _add_get_settings_route(router: APIRouter) -> None:
-    @router.get(
-        "/tags/{tag}/settings",
-        operation_id="get_tag_settings",
-        summary="Get the settings of a tag",
-        response_model=TagSettings,
-        responses=example_response(examples.TAG_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
-    )
-    async def get_tag_settings(tag: TagId, request: Request) -> Response:
-        answers = answers_of(request)
-        return resource_response(answers.site.tag_settings(known_tag(answers, tag).name))
+@router.get(
+    "/newcomers",
+    operation_id="list_newcomers",
+    summary="The former name of /pending-tags, until the next version",
+    deprecated=True,
+    response_model=NewcomerList,
+    responses=example_response(examples.NEWCOMER_LIST) | problems(Kind.INVALID_REQUEST),
+)
+def list_newcomers(request: Request) -> Response:
+    answers = answers_of(request)
+    return json_response({"t_ns": answers.now_ns(), "newcomers": _pending(answers)})
 
 
-def _add_put_settings_route(router: APIRouter) -> None:
-    @router.put(
-        "/tags/{tag}/settings",
-        operation_id="put_tag_settings",
-        summary="Replace the settings of a tag",
-        description="An unknown tag is registered. What the body leaves out is as in `tag_defaults` of the service's "
-        "settings. The estimator of the tag restarts with the new settings, from "
-        "`start` if it is given, unless only `name`, `colour` and `group` have changed.",
-        response_model=TagSettings,
-        responses=example_response(examples.TAG_SETTINGS)
-        | problems(Kind.TAGS_FULL, Kind.CHANGED_MEANWHILE, Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
-    )
-    def put_tag_settings(
-        tag: TagId,
-        settings: Annotated[TagSettings, Body(examples=[examples.TAG_SETTINGS])],
-        allows: Conditions,
-        request: Request,
-    ) -> Response:
-        parts = parts_of(request)
-        answers = parts.answers
-        register_tag(answers, tag, settings, parts.max_tags, allows)
-        return resource_response(answers.site.tag_settings(tag))
+@router.get(
+    "/tags/{tag}",
+    operation_id="get_tag",
+    summary="Get a tag",
+    response_model=TimedTagStatus,
+    responses=example_response(_timed(examples.TAG)) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
+)
+async def get_tag(tag: TagId, request: Request) -> Response:
+    answers = answers_of(request)
+    known, now_ns = known_tag(answers, tag), answers.now_ns()
+    offset = answers.clock_offsets.clock_offset(known.row, now_ns)
+    status = next(_statuses(answers, [known], {known.row: offset}, now_ns))
+    return json_response(_timed(shown_to(request)(status)))
 
 
-def _add_delete_route(router: APIRouter) -> None:
-    @router.delete(
-        "/tags/{tag}",
-        operation_id="delete_tag",
-        summary="Delete a tag: its settings, its counters and its pose",
-        description="Its stored tracks stay. A tag that still sends is unknown from then on. With "
-        '`unknown_tags = "accept"`, it is back with its next message, with the settings in `tag_defaults`. The `ETag` '
-        "of the answer is that of those settings: as the `If-Match` of a `PUT` of the settings, it undoes the deletion "
-        "unless somebody has set others since.",
-        status_code=204,
-        responses=problems(Kind.UNKNOWN_TAG, Kind.CHANGED_MEANWHILE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
-    )
-    def delete_tag(tag: TagId, allows: Conditions, request: Request) -> Response:
-        answers = answers_of(request)
-        known = known_tag(answers, tag)
-        with saving():
-            answers.site.remove_tag(known.name, answers.now_ns(), allows)
-        answers.forget(known)
-        return Response(status_code=204, headers={"etag": etag_of(answers.site.tag_settings(tag))})
+@router.get(
+    "/tags/{tag}/settings",
+    operation_id="get_tag_settings",
+    summary="Get the settings of a tag",
+    response_model=TagSettings,
+    responses=example_response(examples.TAG_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
+)
+async def get_tag_settings(tag: TagId, request: Request) -> Response:
+    answers = answers_of(request)
+    return resource_response(answers.site.tag_settings(known_tag(answers, tag).name))
+
+
+@router.put(
+    "/tags/{tag}/settings",
+    operation_id="put_tag_settings",
+    summary="Replace the settings of a tag",
+    description="An unknown tag is registered. What the body leaves out is as in `tag_defaults` of the service's "
+    "settings. The estimator of the tag restarts with the new settings, from "
+    "`start` if it is given, unless only `name`, `colour` and `group` have changed.",
+    response_model=TagSettings,
+    responses=example_response(examples.TAG_SETTINGS)
+    | problems(Kind.TAGS_FULL, Kind.CHANGED_MEANWHILE, Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
+)
+def put_tag_settings(
+    tag: TagId,
+    settings: Annotated[TagSettings, Body(examples=[examples.TAG_SETTINGS])],
+    allows: Conditions,
+    request: Request,
+) -> Response:
+    parts = parts_of(request)
+    answers = parts.answers
+    register_tag(answers, tag, settings, parts.max_tags, allows)
+    return resource_response(answers.site.tag_settings(tag))
+
+
+@router.delete(
+    "/tags/{tag}",
+    operation_id="delete_tag",
+    summary="Delete a tag: its settings, its counters and its pose",
+    description="Its stored tracks stay. A tag that still sends is unknown from then on. With "
+    '`unknown_tags = "accept"`, it is back with its next message, with the settings in `tag_defaults`. The `ETag` '
+    "of the answer is that of those settings: as the `If-Match` of a `PUT` of the settings, it undoes the deletion "
+    "unless somebody has set others since.",
+    status_code=204,
+    responses=problems(Kind.UNKNOWN_TAG, Kind.CHANGED_MEANWHILE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
+)
+def delete_tag(tag: TagId, allows: Conditions, request: Request) -> Response:
+    answers = answers_of(request)
+    known = known_tag(answers, tag)
+    with saving():
+        answers.site.remove_tag(known.name, answers.now_ns(), allows)
+    answers.forget(known)
+    return Response(status_code=204, headers={"etag": etag_of(answers.site.tag_settings(tag))})
 
 
 def register_tag(answers: Answers, tag: str, settings: TagSettings, max_tags: int, allows: Precondition) -> None:
@@ -207,12 +198,6 @@ def _pending(answers: Answers) -> list[Answer]:
         }
         for tag in answers.pending_tags.all()
     ]
-
-
-def _timed(status: Answer) -> Answer:
-    """Return the `TimedTagStatus` of a `TagStatus`."""
-    times = {name: status[f"{name}_ns"] for name in ("first_heard", "last_heard")}
-    return status | {f"{name}_utc": None if t_ns is None else iso_utc(t_ns) for name, t_ns in times.items()}
 
 
 def _statuses(

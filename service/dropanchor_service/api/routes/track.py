@@ -65,36 +65,38 @@ CONTENT: dict[str, Any] = {
 """The media types of a track in the OpenAPI document."""
 
 
-def track_router() -> APIRouter:
-    router = APIRouter(tags=["poses"])
+def _offers() -> dict[int | str, dict[str, Any]]:
+    return {200: {"content": CONTENT | {"application/json": {"example": examples.TRACK}}}}
 
-    @router.get(
-        "/tags/{tag}/track",
-        operation_id="get_track",
-        summary="Get the track of a tag",
-        description=_DESCRIPTION,
-        response_model=Track,
-        responses=_offers()
-        | problems(
-            *(Kind.UNKNOWN_TAG, Kind.NO_HISTORY, Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED),
-            *(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
-        ),
-    )
-    def get_track(tag: TagId, query: Annotated[TrackQuery, Query()], request: Request) -> Response:
-        answers, form = answers_of(request), track_formats.negotiate(request, query.format)
-        if form in track_formats.GEOREFERENCED:
-            geojson.require_georeference(answers, track_formats.GEOREFERENCED[form])
-        from_ns, to_ns = limits_of(query, answers.now_ns())
-        page = _page(answers, tag, max(from_ns, query.cursor or 0), to_ns, query.limit)
-        following = None if page.next_ns is None else str(page.next_ns)
-        head = {"tag": tag, "from_ns": from_ns, "to_ns": to_ns, "next": following}
-        headers = {"cache-control": "no-store", "vary": "accept"}
-        if following is not None:
-            headers["link"] = _link({"from": from_ns, "to": to_ns, "limit": query.limit, "cursor": following}, form)
-        media_type = track_formats.MEDIA_TYPES[form]
-        return Response(track_formats.encode(page, head, form), media_type=media_type, headers=headers)
 
-    return router
+router = APIRouter(tags=["poses"])
+
+
+@router.get(
+    "/tags/{tag}/track",
+    operation_id="get_track",
+    summary="Get the track of a tag",
+    description=_DESCRIPTION,
+    response_model=Track,
+    responses=_offers()
+    | problems(
+        *(Kind.UNKNOWN_TAG, Kind.NO_HISTORY, Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED),
+        *(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
+    ),
+)
+def get_track(tag: TagId, query: Annotated[TrackQuery, Query()], request: Request) -> Response:
+    answers, form = answers_of(request), track_formats.negotiate(request, query.format)
+    if form in track_formats.GEOREFERENCED:
+        geojson.require_georeference(answers, track_formats.GEOREFERENCED[form])
+    from_ns, to_ns = limits_of(query, answers.now_ns())
+    page = _page(answers, tag, max(from_ns, query.cursor or 0), to_ns, query.limit)
+    following = None if page.next_ns is None else str(page.next_ns)
+    head = {"tag": tag, "from_ns": from_ns, "to_ns": to_ns, "next": following}
+    headers = {"cache-control": "no-store", "vary": "accept"}
+    if following is not None:
+        headers["link"] = _link({"from": from_ns, "to": to_ns, "limit": query.limit, "cursor": following}, form)
+    media_type = track_formats.MEDIA_TYPES[form]
+    return Response(track_formats.encode(page, head, form), media_type=media_type, headers=headers)
 
 
 def _page(answers: Answers, tag: str, from_ns: int, to_ns: int, limit: int) -> TrackPage:
@@ -108,7 +110,3 @@ def _page(answers: Answers, tag: str, from_ns: int, to_ns: int, limit: int) -> T
 
 def _link(query: dict[str, Any], form: str) -> str:
     return f'<?{urlencode(query | {"format": form})}>; rel="next"'
-
-
-def _offers() -> dict[int | str, dict[str, Any]]:
-    return {200: {"content": CONTENT | {"application/json": {"example": examples.TRACK}}}}

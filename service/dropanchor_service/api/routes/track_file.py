@@ -40,40 +40,44 @@ class FileQuery(Period):
     )
 
 
-def track_file_router() -> APIRouter:
-    router = APIRouter(tags=["poses"])
+def _offers() -> dict[int | str, dict[str, Any]]:
+    """Return the response in the OpenAPI document. Clients are generated for the first media type: the default."""
+    default = MEDIA_TYPES[track_formats.CSV]
+    return {200: {"content": {default: CONTENT[default]} | CONTENT | {MEDIA_TYPES[PARQUET]: BYTES}}}
 
-    @router.get(
-        "/tags/{tag}/track/file",
-        operation_id="export_track",
-        summary="Export the track of a tag as a file",
-        description=_DESCRIPTION,
-        response_class=StreamingResponse,
-        responses=_offers()
-        | problems(
-            *(Kind.UNKNOWN_TAG, Kind.NO_HISTORY, Kind.NOT_GEOREFERENCED, Kind.NOT_INSTALLED),
-            *(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
-        ),
+
+router = APIRouter(tags=["poses"])
+
+
+@router.get(
+    "/tags/{tag}/track/file",
+    operation_id="export_track",
+    summary="Export the track of a tag as a file",
+    description=_DESCRIPTION,
+    response_class=StreamingResponse,
+    responses=_offers()
+    | problems(
+        *(Kind.UNKNOWN_TAG, Kind.NO_HISTORY, Kind.NOT_GEOREFERENCED, Kind.NOT_INSTALLED),
+        *(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
+    ),
+)
+def export_track(tag: TagId, query: Annotated[FileQuery, Query()], request: Request) -> StreamingResponse:
+    answers = answers_of(request)
+    if query.format in track_formats.GEOREFERENCED:
+        geojson.require_georeference(answers, track_formats.GEOREFERENCED[query.format])
+    to_parquet = _parquet() if query.format == PARQUET else None
+    from_ns, to_ns = limits_of(query, answers.now_ns())
+    head = {"tag": tag, "from_ns": from_ns, "to_ns": to_ns, "next": None}
+    pages = _pages(answers, tag, from_ns, to_ns)
+    if to_parquet is None:
+        content = track_formats.stream(pages, head, query.format)
+    else:
+        content = to_parquet(pages, tag, answers.site.site)
+    return StreamingResponse(
+        content,
+        media_type=MEDIA_TYPES[query.format],
+        headers={"cache-control": "no-store", "content-disposition": _attachment(f"{tag}.{query.format}")},
     )
-    def export_track(tag: TagId, query: Annotated[FileQuery, Query()], request: Request) -> StreamingResponse:
-        answers = answers_of(request)
-        if query.format in track_formats.GEOREFERENCED:
-            geojson.require_georeference(answers, track_formats.GEOREFERENCED[query.format])
-        to_parquet = _parquet() if query.format == PARQUET else None
-        from_ns, to_ns = limits_of(query, answers.now_ns())
-        head = {"tag": tag, "from_ns": from_ns, "to_ns": to_ns, "next": None}
-        pages = _pages(answers, tag, from_ns, to_ns)
-        if to_parquet is None:
-            content = track_formats.stream(pages, head, query.format)
-        else:
-            content = to_parquet(pages, tag, answers.site.site)
-        return StreamingResponse(
-            content,
-            media_type=MEDIA_TYPES[query.format],
-            headers={"cache-control": "no-store", "content-disposition": _attachment(f"{tag}.{query.format}")},
-        )
-
-    return router
 
 
 def _parquet() -> Callable[[Iterable[TrackPage], str, Site], Iterator[bytes]]:
@@ -107,9 +111,3 @@ def _pages(answers: Answers, tag: str, from_ns: int, to_ns: int) -> Iterator[Tra
 
 def _attachment(name: str) -> str:
     return f"attachment; filename*=UTF-8''{quote(name, safe='')}"
-
-
-def _offers() -> dict[int | str, dict[str, Any]]:
-    """Return the response in the OpenAPI document. Clients are generated for the first media type: the default."""
-    default = MEDIA_TYPES[track_formats.CSV]
-    return {200: {"content": {default: CONTENT[default]} | CONTENT | {MEDIA_TYPES[PARQUET]: BYTES}}}

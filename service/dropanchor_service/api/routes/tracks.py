@@ -28,28 +28,26 @@ class TracksQuery(TagFilter, Period):
     max_points: int = Field(default=300, ge=2, le=5000, description="The maximum number of points of a tag.")
 
 
-def tracks_router() -> APIRouter:
-    router = APIRouter(tags=["poses"])
+router = APIRouter(tags=["poses"])
 
-    @router.get(
-        "/tracks",
-        operation_id="get_tracks",
-        summary="Get figures and points of the tracks of many tags",
-        description=_DESCRIPTION,
-        response_model=Tracks,
-        responses=example_response(examples.TRACKS)
-        | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
-    )
-    def get_tracks(query: Annotated[TracksQuery, Query()], request: Request) -> Response:
-        answers = answers_of(request)
-        from_ns, to_ns = limits_of(query, answers.now_ns())
-        tracks = history_of(answers)
-        try:
-            floors = answers.site.floors
-            return json_response(many_tracks(tracks, floors, query.tags or None, from_ns, to_ns, query.max_points))
-        except TooMuchError as error:
-            raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
-        except HistoryError as error:
-            raise unreadable(error) from error
 
-    return router
+@router.get(
+    "/tracks",
+    operation_id="get_tracks",
+    summary="Get figures and points of the tracks of many tags",
+    description=_DESCRIPTION,
+    response_model=Tracks,
+    responses=example_response(examples.TRACKS)
+    | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
+)
+def get_tracks(query: Annotated[TracksQuery, Query()], request: Request) -> Response:
+    answers = answers_of(request)
+    from_ns, to_ns = limits_of(query, answers.now_ns())
+    tracks = history_of(answers)
+    try:
+        floors = answers.site.floors
+        return json_response(many_tracks(tracks, floors, query.tags or None, from_ns, to_ns, query.max_points))
+    except TooMuchError as error:
+        raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
+    except HistoryError as error:
+        raise unreadable(error) from error

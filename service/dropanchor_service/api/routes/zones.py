@@ -12,13 +12,6 @@ from dropanchor_service.api.routes.site_of_request import parts_of
 from dropanchor_service.zones.shapes import ShapeError, vertices_of
 
 
-def zones_router() -> APIRouter:
-    router = APIRouter(tags=["zones"], dependencies=[NO_QUERY])
-    add_item_routes(router, _zones())
-    add_item_routes(router, _rules())
-    return router
-
-
 def _zones() -> Resource[Zone]:
     return Resource(
         lambda request: parts_of(request).events.items.zones,
@@ -54,3 +47,8 @@ def _check_shape(zone: Zone, _: Request) -> None:
         vertices_of(zone.shape)
     except ShapeError as error:
         raise ProblemError(Kind.SHAPE_REFUSED, at("body.shape", with_stop(said_by(error)))) from error
+
+
+router = APIRouter(tags=["zones"], dependencies=[NO_QUERY])
+add_item_routes(router, _zones())
+add_item_routes(router, _rules())

@@ -48,23 +48,21 @@ class Subscription:
     identity: Identity | None
 
 
-def feed_router() -> APIRouter:
-    """Return the router of the WebSocket."""
-    router, numbers = APIRouter(), itertools.count(1)
+router = APIRouter()
+_numbers = itertools.count(1)
 
-    @router.websocket("/ws/socket")
-    async def serve(socket: WebSocket) -> None:
-        await socket.accept()
-        client, shared = client_of(socket, None), shared_of(socket)
-        try:
-            with shared.feed_connections.one_more(client, CONNECTIONS_PER_CLIENT):
-                await Connection(socket, hub_of(socket), shared, numbers).serve()
-        except ProblemError:
-            await socket.close(UNKNOWN_SITE, "There is no site with this id.")
-        except TooManyConnectionsError:
-            await socket.close(TOO_MANY, f"This client has {CONNECTIONS_PER_CLIENT} connections: end one first.")
 
-    return router
+@router.websocket("/ws/socket")
+async def serve(socket: WebSocket) -> None:
+    await socket.accept()
+    client, shared = client_of(socket, None), shared_of(socket)
+    try:
+        with shared.feed_connections.one_more(client, CONNECTIONS_PER_CLIENT):
+            await Connection(socket, hub_of(socket), shared, _numbers).serve()
+    except ProblemError:
+        await socket.close(UNKNOWN_SITE, "There is no site with this id.")
+    except TooManyConnectionsError:
+        await socket.close(TOO_MANY, f"This client has {CONNECTIONS_PER_CLIENT} connections: end one first.")
 
 
 class Connection:

@@ -44,16 +44,7 @@ EXAMPLE = {
 }
 
 
-def fences_router() -> APIRouter:
-    router = APIRouter(prefix="/fences", tags=["fences"], strict_content_type=LENIENT)
-    _add_list_routes(router)
-    _add_create_route(router)
-    _add_collection_delete(router)
-    _add_object_routes(router)
-    _add_change_route(router)
-    _add_routes_for_places_inside(router)
-    _add_routes_for_objects_inside(router)
-    return router
+router = APIRouter(prefix="/fences", tags=["fences"], strict_content_type=LENIENT)
 
 
 def fences_around(tags: Sequence[Tag], hub: Hub, query: SpatialQuery) -> Response:
@@ -63,149 +54,146 @@ def fences_around(tags: Sequence[Tag], hub: Hub, query: SpatialQuery) -> Respons
     return json_response([hub.fences.answer(zone, projection) for zone in zones])
 
 
-def _add_list_routes(router: APIRouter) -> None:
-    @router.get("", operation_id="list_fence_ids", summary="List the ids of the fences", responses=errors())
-    def list_ids(hub: SiteHub) -> list[str]:
-        return [str(hub.fences.id_of(zone.id)) for zone in hub.fences.all()]
-
-    @router.get(
-        "/summary",
-        operation_id="list_fences",
-        summary="List the fences",
-        response_model=list[Fence] | FeatureCollection,
-        responses=errors(*_PLACED),
-    )
-    def list_fences(hub: SiteHub, query: Annotated[PlaceQuery, Query()]) -> Response:
-        projection = query.projection(hub)
-        return many([hub.fences.answer(zone, projection) for zone in hub.fences.all()], query, fence_feature)
+@router.get("", operation_id="list_fence_ids", summary="List the ids of the fences", responses=errors())
+def list_ids(hub: SiteHub) -> list[str]:
+    return [str(hub.fences.id_of(zone.id)) for zone in hub.fences.all()]
 
 
-def _add_create_route(router: APIRouter) -> None:
-    @router.post(
-        "",
-        operation_id="create_fence",
-        summary="Create a fence",
-        description="It is a zone of this service from then on: a polygon without holes, or a circle around a point.",
-        status_code=201,
-        response_model=Fence,
-        responses=errors(Kind.SHAPE_REFUSED, Kind.EXISTS_ALREADY, *_SAVED),
-    )
-    def create_fence(
-        hub: SiteHub,
-        fence: Annotated[Fence, Body(examples=[EXAMPLE])],
-        query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
-    ) -> Response:
-        identifier = id_of_new(fence.id)
-        if any(hub.fences.id_of(zone.id) == identifier for zone in hub.fences.all()):
-            raise exists_already("fence", identifier)
-        zone = hub.fences.save(str(identifier), fence, None)
-        projection = projection_of(hub.answers.site.site, fence.crs)
-        return json_response(hub.fences.answer(zone, projection), status=201)
+@router.get(
+    "/summary",
+    operation_id="list_fences",
+    summary="List the fences",
+    response_model=list[Fence] | FeatureCollection,
+    responses=errors(*_PLACED),
+)
+def list_fences(hub: SiteHub, query: Annotated[PlaceQuery, Query()]) -> Response:
+    projection = query.projection(hub)
+    return many([hub.fences.answer(zone, projection) for zone in hub.fences.all()], query, fence_feature)
 
 
-def _add_collection_delete(router: APIRouter) -> None:
-    @router.delete(
-        "",
-        operation_id="delete_fences",
-        summary="Delete all fences, which are all zones of this service",
-        status_code=204,
-        responses=errors(Kind.NOT_SAVED),
-    )
-    def delete_fences(hub: SiteHub) -> Response:
-        for zone in hub.fences.all():
-            hub.fences.delete(zone)
-        return Response(status_code=204)
+@router.post(
+    "",
+    operation_id="create_fence",
+    summary="Create a fence",
+    description="It is a zone of this service from then on: a polygon without holes, or a circle around a point.",
+    status_code=201,
+    response_model=Fence,
+    responses=errors(Kind.SHAPE_REFUSED, Kind.EXISTS_ALREADY, *_SAVED),
+)
+def create_fence(
+    hub: SiteHub,
+    fence: Annotated[Fence, Body(examples=[EXAMPLE])],
+    query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
+) -> Response:
+    identifier = id_of_new(fence.id)
+    if any(hub.fences.id_of(zone.id) == identifier for zone in hub.fences.all()):
+        raise exists_already("fence", identifier)
+    zone = hub.fences.save(str(identifier), fence, None)
+    projection = projection_of(hub.answers.site.site, fence.crs)
+    return json_response(hub.fences.answer(zone, projection), status=201)
 
 
-def _add_object_routes(router: APIRouter) -> None:
-    @router.get(
-        "/{fence_id}",
-        operation_id="get_fence",
-        summary="Get a fence",
-        response_model=Fence | Feature,
-        responses=errors(_UNKNOWN, *_PLACED),
-    )
-    def get_fence(hub: SiteHub, fence_id: FenceId, query: Annotated[PlaceQuery, Query()]) -> Response:
-        return one(hub.fences.answer(hub.fences.find(fence_id), query.projection(hub)), query, fence_feature)
-
-    @router.delete(
-        "/{fence_id}",
-        operation_id="delete_fence",
-        summary="Delete a fence",
-        description="Its events stay. What is inside makes no exit.",
-        status_code=204,
-        responses=errors(_UNKNOWN, Kind.NOT_SAVED),
-    )
-    def delete_fence(hub: SiteHub, fence_id: FenceId) -> Response:
-        hub.fences.delete(hub.fences.find(fence_id))
-        return Response(status_code=204)
+@router.delete(
+    "",
+    operation_id="delete_fences",
+    summary="Delete all fences, which are all zones of this service",
+    status_code=204,
+    responses=errors(Kind.NOT_SAVED),
+)
+def delete_fences(hub: SiteHub) -> Response:
+    for zone in hub.fences.all():
+        hub.fences.delete(zone)
+    return Response(status_code=204)
 
 
-def _add_change_route(router: APIRouter) -> None:
-    @router.put(
-        "/{fence_id}",
-        operation_id="put_fence",
-        summary="Change a fence",
-        description="What only the zone has, such as the tags it concerns and its delay, stays as it is.",
-        status_code=204,
-        responses=errors(_UNKNOWN, Kind.SHAPE_REFUSED, Kind.ID_DIFFERS, *_SAVED),
-    )
-    def put_fence(
-        hub: SiteHub,
-        fence_id: FenceId,
-        fence: Annotated[Fence, Body(examples=[EXAMPLE])],
-        query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
-    ) -> Response:
-        present = hub.fences.find(fence_id)
-        require_id(fence_id, fence.id)
-        hub.fences.save(present.id, fence, present)
-        return Response(status_code=204)
+@router.get(
+    "/{fence_id}",
+    operation_id="get_fence",
+    summary="Get a fence",
+    response_model=Fence | Feature,
+    responses=errors(_UNKNOWN, *_PLACED),
+)
+def get_fence(hub: SiteHub, fence_id: FenceId, query: Annotated[PlaceQuery, Query()]) -> Response:
+    return one(hub.fences.answer(hub.fences.find(fence_id), query.projection(hub)), query, fence_feature)
 
 
-def _add_routes_for_places_inside(router: APIRouter) -> None:
-    @router.get(
-        "/{fence_id}/locations",
-        operation_id="list_fence_locations",
-        summary="List the locations of the tags in a fence",
-        response_model=list[Location] | FeatureCollection,
-        responses=errors(*_INSIDE, *_PLACED),
-    )
-    def list_locations(hub: SiteHub, fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
-        tags = _tags_in(hub, fence_id, query)
-        return many(hub.places.of_tags(tags, query.projection(hub)), query, location_feature)
-
-    @router.get(
-        "/{fence_id}/motions",
-        operation_id="list_fence_motions",
-        summary="List the motions of the trackables in a fence",
-        response_model=list[TrackableMotion] | FeatureCollection,
-        responses=errors(*_INSIDE, *_PLACED),
-    )
-    def list_motions(hub: SiteHub, fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
-        assets = hub.assets.of_tags(_tags_in(hub, fence_id, query))
-        return many(hub.motions(assets, query.projection(hub)), query, motion_feature)
+@router.delete(
+    "/{fence_id}",
+    operation_id="delete_fence",
+    summary="Delete a fence",
+    description="Its events stay. What is inside makes no exit.",
+    status_code=204,
+    responses=errors(_UNKNOWN, Kind.NOT_SAVED),
+)
+def delete_fence(hub: SiteHub, fence_id: FenceId) -> Response:
+    hub.fences.delete(hub.fences.find(fence_id))
+    return Response(status_code=204)
 
 
-def _add_routes_for_objects_inside(router: APIRouter) -> None:
-    @router.get(
-        "/{fence_id}/providers",
-        operation_id="list_fence_providers",
-        summary="List the tags in a fence",
-        response_model=list[LocationProvider],
-        responses=errors(*_INSIDE),
-    )
-    def list_providers(hub: SiteHub, fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
-        return json_response(hub.providers(_tags_in(hub, fence_id, query)))
+@router.put(
+    "/{fence_id}",
+    operation_id="put_fence",
+    summary="Change a fence",
+    description="What only the zone has, such as the tags it concerns and its delay, stays as it is.",
+    status_code=204,
+    responses=errors(_UNKNOWN, Kind.SHAPE_REFUSED, Kind.ID_DIFFERS, *_SAVED),
+)
+def put_fence(
+    hub: SiteHub,
+    fence_id: FenceId,
+    fence: Annotated[Fence, Body(examples=[EXAMPLE])],
+    query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
+) -> Response:
+    present = hub.fences.find(fence_id)
+    require_id(fence_id, fence.id)
+    hub.fences.save(present.id, fence, present)
+    return Response(status_code=204)
 
-    @router.get(
-        "/{fence_id}/trackables",
-        operation_id="list_fence_trackables",
-        summary="List the trackables in a fence",
-        response_model=list[Trackable],
-        responses=errors(*_INSIDE),
-    )
-    def list_trackables(hub: SiteHub, fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
-        return json_response(hub.trackables(hub.assets.of_tags(_tags_in(hub, fence_id, query))))
+
+@router.get(
+    "/{fence_id}/locations",
+    operation_id="list_fence_locations",
+    summary="List the locations of the tags in a fence",
+    response_model=list[Location] | FeatureCollection,
+    responses=errors(*_INSIDE, *_PLACED),
+)
+def list_locations(hub: SiteHub, fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
+    tags = _tags_in(hub, fence_id, query)
+    return many(hub.places.of_tags(tags, query.projection(hub)), query, location_feature)
+
+
+@router.get(
+    "/{fence_id}/motions",
+    operation_id="list_fence_motions",
+    summary="List the motions of the trackables in a fence",
+    response_model=list[TrackableMotion] | FeatureCollection,
+    responses=errors(*_INSIDE, *_PLACED),
+)
+def list_motions(hub: SiteHub, fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
+    assets = hub.assets.of_tags(_tags_in(hub, fence_id, query))
+    return many(hub.motions(assets, query.projection(hub)), query, motion_feature)
+
+
+@router.get(
+    "/{fence_id}/providers",
+    operation_id="list_fence_providers",
+    summary="List the tags in a fence",
+    response_model=list[LocationProvider],
+    responses=errors(*_INSIDE),
+)
+def list_providers(hub: SiteHub, fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
+    return json_response(hub.providers(_tags_in(hub, fence_id, query)))
+
+
+@router.get(
+    "/{fence_id}/trackables",
+    operation_id="list_fence_trackables",
+    summary="List the trackables in a fence",
+    response_model=list[Trackable],
+    responses=errors(*_INSIDE),
+)
+def list_trackables(hub: SiteHub, fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
+    return json_response(hub.trackables(hub.assets.of_tags(_tags_in(hub, fence_id, query))))
 
 
 def _tags_in(hub: Hub, fence_id: FenceId, query: SpatialQuery) -> list[Tag]:

@@ -39,164 +39,155 @@ TAKES_NO_POSITIONS = (
 )
 
 
-def providers_router() -> APIRouter:
-    router = APIRouter(prefix="/providers", tags=["providers"], strict_content_type=LENIENT)
-    _add_list_routes(router)
-    _add_create_route(router)
-    _add_refused_routes(router)
-    _add_object_routes(router)
-    _add_delete_route(router)
-    _add_location_route(router)
-    _add_related_routes(router)
-    return router
+router = APIRouter(prefix="/providers", tags=["providers"], strict_content_type=LENIENT)
 
 
-def _add_list_routes(router: APIRouter) -> None:
-    @router.get("", operation_id="list_provider_ids", summary="List the ids of the tags", responses=errors())
-    def list_ids(hub: SiteHub) -> list[str]:
-        return [tag.name for tag in hub.answers.tags.listed()]
-
-    @router.get(
-        "/summary",
-        operation_id="list_providers",
-        summary="List the tags as location providers",
-        response_model=list[LocationProvider],
-        responses=errors(),
-    )
-    def list_providers(hub: SiteHub) -> Response:
-        return json_response(hub.providers(hub.answers.tags.listed()))
-
-    @router.get(
-        "/locations",
-        operation_id="list_locations",
-        summary="List the locations of all tags whose place is known",
-        response_model=list[Location] | FeatureCollection,
-        responses=errors(Kind.NOT_GEOREFERENCED),
-    )
-    def list_locations(hub: SiteHub, query: Annotated[PlaceQuery, Query()]) -> Response:
-        return many(hub.places.of_tags(hub.answers.tags.listed(), query.projection(hub)), query, location_feature)
+@router.get("", operation_id="list_provider_ids", summary="List the ids of the tags", responses=errors())
+def list_ids(hub: SiteHub) -> list[str]:
+    return [tag.name for tag in hub.answers.tags.listed()]
 
 
-def _add_create_route(router: APIRouter) -> None:
-    @router.post(
-        "",
-        operation_id="create_provider",
-        summary="Register a tag",
-        status_code=201,
-        response_model=LocationProvider,
-        responses=errors(Kind.EXISTS_ALREADY, *_SAVED),
-    )
-    def create_provider(hub: SiteHub, provider: Annotated[LocationProvider, Body(examples=[EXAMPLE])]) -> Response:
-        known = hub.answers.tags.find(provider.id)
-        if known is not None and not hub.answers.tags.is_deleted(known.row):
-            raise exists_already("tag", provider.id)
-        return json_response(hub.providers([_saved(hub, provider)])[0], status=201)
+@router.get(
+    "/summary",
+    operation_id="list_providers",
+    summary="List the tags as location providers",
+    response_model=list[LocationProvider],
+    responses=errors(),
+)
+def list_providers(hub: SiteHub) -> Response:
+    return json_response(hub.providers(hub.answers.tags.listed()))
 
 
-def _add_refused_routes(router: APIRouter) -> None:
-    """Add the routes on which other hubs take positions. They answer why this one does not."""
-
-    async def refuse() -> None:
-        raise ProblemError(Kind.NOT_OFFERED, TAKES_NO_POSITIONS)
-
-    async def refuse_of(provider_id: ProviderId) -> None:  # noqa: ARG001 - the document names it
-        await refuse()
-
-    for what, path in (("location", "locations"), ("proximity", "proximities")):
-        for operation, route, answer in ((what, f"/{{provider_id}}/{what}", refuse_of), (path, f"/{path}", refuse)):
-            router.add_api_route(
-                route,
-                answer,
-                methods=["PUT"],
-                operation_id=f"put_{operation}",
-                summary="Refused: this service computes positions and takes none",
-                status_code=204,
-                responses=errors(Kind.NOT_OFFERED),
-            )
+@router.get(
+    "/locations",
+    operation_id="list_locations",
+    summary="List the locations of all tags whose place is known",
+    response_model=list[Location] | FeatureCollection,
+    responses=errors(Kind.NOT_GEOREFERENCED),
+)
+def list_locations(hub: SiteHub, query: Annotated[PlaceQuery, Query()]) -> Response:
+    return many(hub.places.of_tags(hub.answers.tags.listed(), query.projection(hub)), query, location_feature)
 
 
-def _add_object_routes(router: APIRouter) -> None:
-    @router.get(
-        "/{provider_id}",
-        operation_id="get_provider",
-        summary="Get a tag as location provider",
-        response_model=LocationProvider,
-        responses=errors(_UNKNOWN),
-    )
-    def get_provider(hub: SiteHub, provider_id: ProviderId) -> Response:
-        return json_response(hub.providers([known_tag(hub.answers, provider_id)])[0])
-
-    @router.put(
-        "/{provider_id}",
-        operation_id="put_provider",
-        summary="Set the name and the properties of a tag",
-        status_code=204,
-        responses=errors(_UNKNOWN, Kind.ID_DIFFERS, *_SAVED),
-    )
-    def put_provider(
-        hub: SiteHub, provider_id: ProviderId, provider: Annotated[LocationProvider, Body(examples=[EXAMPLE])]
-    ) -> Response:
-        known_tag(hub.answers, provider_id)
-        require_id(provider_id, provider.id)
-        _saved(hub, provider)
-        return Response(status_code=204)
+@router.post(
+    "",
+    operation_id="create_provider",
+    summary="Register a tag",
+    status_code=201,
+    response_model=LocationProvider,
+    responses=errors(Kind.EXISTS_ALREADY, *_SAVED),
+)
+def create_provider(hub: SiteHub, provider: Annotated[LocationProvider, Body(examples=[EXAMPLE])]) -> Response:
+    known = hub.answers.tags.find(provider.id)
+    if known is not None and not hub.answers.tags.is_deleted(known.row):
+        raise exists_already("tag", provider.id)
+    return json_response(hub.providers([_saved(hub, provider)])[0], status=201)
 
 
-def _add_delete_route(router: APIRouter) -> None:
-    @router.delete(
-        "/{provider_id}",
-        operation_id="delete_provider",
-        summary="Delete a tag: its settings, its counters and its pose",
-        description="A tag that still sends is back with its next message.",
-        status_code=204,
-        responses=errors(_UNKNOWN, Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED),
-    )
-    def delete_provider(hub: SiteHub, provider_id: ProviderId) -> Response:
-        tag = known_tag(hub.answers, provider_id)
-        forget(hub.items.providers, tag.name)
-        forget(hub.items.tag_trackables, tag.name)
-        with saving():
-            hub.answers.site.remove_tag(tag.name, hub.answers.now_ns())
-        hub.answers.forget(tag)
-        return Response(status_code=204)
+"""Add the routes on which other hubs take positions. They answer why this one does not."""
 
 
-def _add_location_route(router: APIRouter) -> None:
-    @router.get(
-        "/{provider_id}/location",
-        operation_id="get_provider_location",
-        summary="Get the location of a tag",
-        response_model=Location | Feature,
-        responses=errors(_UNKNOWN, Kind.NO_LOCATION, Kind.NOT_GEOREFERENCED),
-    )
-    def get_location(hub: SiteHub, provider_id: ProviderId, query: Annotated[PlaceQuery, Query()]) -> Response:
-        tag = known_tag(hub.answers, provider_id)
-        locations = hub.places.of_tags([tag], query.projection(hub))
-        if not locations:
-            raise hub.no_location([tag])
-        return one(locations[0], query, location_feature)
+async def refuse() -> None:
+    raise ProblemError(Kind.NOT_OFFERED, TAKES_NO_POSITIONS)
 
 
-def _add_related_routes(router: APIRouter) -> None:
-    @router.get(
-        "/{provider_id}/trackables",
-        operation_id="list_provider_trackables",
-        summary="List the trackable that carries a tag",
-        response_model=list[Trackable],
-        responses=errors(_UNKNOWN),
-    )
-    def list_trackables(hub: SiteHub, provider_id: ProviderId) -> Response:
-        return json_response(hub.trackables(hub.assets.of_tags([known_tag(hub.answers, provider_id)])))
+async def refuse_of(provider_id: ProviderId) -> None:  # noqa: ARG001 - the document names it
+    await refuse()
 
-    @router.get(
-        "/{provider_id}/fences",
-        operation_id="list_provider_fences",
-        summary="List the fences in which a tag is",
-        response_model=list[Fence],
-        responses=errors(_UNKNOWN, Kind.EVENTS_UNREADABLE),
-    )
-    def list_fences(hub: SiteHub, provider_id: ProviderId, query: Annotated[SpatialQuery, Query()]) -> Response:
-        return fences_around([known_tag(hub.answers, provider_id)], hub, query)
+
+for what, path in (("location", "locations"), ("proximity", "proximities")):
+    for operation, route, answer in ((what, f"/{{provider_id}}/{what}", refuse_of), (path, f"/{path}", refuse)):
+        router.add_api_route(
+            route,
+            answer,
+            methods=["PUT"],
+            operation_id=f"put_{operation}",
+            summary="Refused: this service computes positions and takes none",
+            status_code=204,
+            responses=errors(Kind.NOT_OFFERED),
+        )
+
+
+@router.get(
+    "/{provider_id}",
+    operation_id="get_provider",
+    summary="Get a tag as location provider",
+    response_model=LocationProvider,
+    responses=errors(_UNKNOWN),
+)
+def get_provider(hub: SiteHub, provider_id: ProviderId) -> Response:
+    return json_response(hub.providers([known_tag(hub.answers, provider_id)])[0])
+
+
+@router.put(
+    "/{provider_id}",
+    operation_id="put_provider",
+    summary="Set the name and the properties of a tag",
+    status_code=204,
+    responses=errors(_UNKNOWN, Kind.ID_DIFFERS, *_SAVED),
+)
+def put_provider(
+    hub: SiteHub, provider_id: ProviderId, provider: Annotated[LocationProvider, Body(examples=[EXAMPLE])]
+) -> Response:
+    known_tag(hub.answers, provider_id)
+    require_id(provider_id, provider.id)
+    _saved(hub, provider)
+    return Response(status_code=204)
+
+
+@router.delete(
+    "/{provider_id}",
+    operation_id="delete_provider",
+    summary="Delete a tag: its settings, its counters and its pose",
+    description="A tag that still sends is back with its next message.",
+    status_code=204,
+    responses=errors(_UNKNOWN, Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED),
+)
+def delete_provider(hub: SiteHub, provider_id: ProviderId) -> Response:
+    tag = known_tag(hub.answers, provider_id)
+    forget(hub.items.providers, tag.name)
+    forget(hub.items.tag_trackables, tag.name)
+    with saving():
+        hub.answers.site.remove_tag(tag.name, hub.answers.now_ns())
+    hub.answers.forget(tag)
+    return Response(status_code=204)
+
+
+@router.get(
+    "/{provider_id}/location",
+    operation_id="get_provider_location",
+    summary="Get the location of a tag",
+    response_model=Location | Feature,
+    responses=errors(_UNKNOWN, Kind.NO_LOCATION, Kind.NOT_GEOREFERENCED),
+)
+def get_location(hub: SiteHub, provider_id: ProviderId, query: Annotated[PlaceQuery, Query()]) -> Response:
+    tag = known_tag(hub.answers, provider_id)
+    locations = hub.places.of_tags([tag], query.projection(hub))
+    if not locations:
+        raise hub.no_location([tag])
+    return one(locations[0], query, location_feature)
+
+
+@router.get(
+    "/{provider_id}/trackables",
+    operation_id="list_provider_trackables",
+    summary="List the trackable that carries a tag",
+    response_model=list[Trackable],
+    responses=errors(_UNKNOWN),
+)
+def list_trackables(hub: SiteHub, provider_id: ProviderId) -> Response:
+    return json_response(hub.trackables(hub.assets.of_tags([known_tag(hub.answers, provider_id)])))
+
+
+@router.get(
+    "/{provider_id}/fences",
+    operation_id="list_provider_fences",
+    summary="List the fences in which a tag is",
+    response_model=list[Fence],
+    responses=errors(_UNKNOWN, Kind.EVENTS_UNREADABLE),
+)
+def list_fences(hub: SiteHub, provider_id: ProviderId, query: Annotated[SpatialQuery, Query()]) -> Response:
+    return fences_around([known_tag(hub.answers, provider_id)], hub, query)
 
 
 def _saved(hub: Hub, provider: LocationProvider) -> Tag:

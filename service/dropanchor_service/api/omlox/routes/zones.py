@@ -15,39 +15,34 @@ from dropanchor_service.api.routes.parameters import json_response
 ForeignId = Annotated[str | None, Query(description="Return only the zone of the anchor with this id.")]
 
 
-def zones_router() -> APIRouter:
-    router = APIRouter(prefix="/zones", tags=["zones"])
-    _add_list_routes(router)
-    _add_object_route(router)
-    return router
+router = APIRouter(prefix="/zones", tags=["zones"])
 
 
-def _add_list_routes(router: APIRouter) -> None:
-    @router.get("", operation_id="list_zone_ids", summary="List the ids of the zones", responses=errors())
-    def list_ids(hub: SiteHub, foreign_id: ForeignId = None) -> list[str]:
-        return [zone["id"] for zone in zone_answers(hub.answers.site.site, foreign_id)]
-
-    @router.get(
-        "/summary",
-        operation_id="list_zones",
-        summary="List the zones: one around each anchor",
-        response_model=list[Zone],
-        responses=errors(),
-    )
-    def list_zones(hub: SiteHub, foreign_id: ForeignId = None) -> Response:
-        return json_response(list(zone_answers(hub.answers.site.site, foreign_id)))
+@router.get("", operation_id="list_zone_ids", summary="List the ids of the zones", responses=errors())
+def list_ids(hub: SiteHub, foreign_id: ForeignId = None) -> list[str]:
+    return [zone["id"] for zone in zone_answers(hub.answers.site.site, foreign_id)]
 
 
-def _add_object_route(router: APIRouter) -> None:
-    @router.get(
-        "/{zone_id}",
-        operation_id="get_zone",
-        summary="Get a zone",
-        response_model=Zone,
-        responses=errors(Kind.UNKNOWN_ZONE),
-    )
-    def get_zone(hub: SiteHub, zone_id: ZoneId) -> Response:
-        for zone in zone_answers(hub.answers.site.site):
-            if zone["id"] == str(zone_id):
-                return json_response(zone)
-        raise ProblemError(Kind.UNKNOWN_ZONE, f"There is no zone with the id {zone_id}.")
+@router.get(
+    "/summary",
+    operation_id="list_zones",
+    summary="List the zones: one around each anchor",
+    response_model=list[Zone],
+    responses=errors(),
+)
+def list_zones(hub: SiteHub, foreign_id: ForeignId = None) -> Response:
+    return json_response(list(zone_answers(hub.answers.site.site, foreign_id)))
+
+
+@router.get(
+    "/{zone_id}",
+    operation_id="get_zone",
+    summary="Get a zone",
+    response_model=Zone,
+    responses=errors(Kind.UNKNOWN_ZONE),
+)
+def get_zone(hub: SiteHub, zone_id: ZoneId) -> Response:
+    for zone in zone_answers(hub.answers.site.site):
+        if zone["id"] == str(zone_id):
+            return json_response(zone)
+    raise ProblemError(Kind.UNKNOWN_ZONE, f"There is no zone with the id {zone_id}.")
