@@ -19,8 +19,8 @@ const sources = readdirSync(PAGE, { recursive: true, encoding: "utf8" })
 /** @param {string | {one: string, other: string}} message */
 const placeholders = (message) => [...new Set(JSON.stringify(message).match(/\{\w+\}/g) ?? [])].sort();
 
-test("every message is in both languages, with the same values", () => {
-  assert.deepEqual(Object.keys(de).sort(), Object.keys(en).sort());
+test("every message is in both languages, with the same values, but for what the service says in English", () => {
+  assert.deepEqual(Object.keys(de).filter((key) => !(key in en) && !/^(say|word)\./.test(key)), []);
   for (const [key, message] of Object.entries(en)) {
     assert.notEqual(de[key], "", key);
     assert.equal(typeof de[key], typeof message, key);

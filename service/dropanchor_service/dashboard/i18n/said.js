@@ -43,10 +43,12 @@ function partsOf({ errors = [] }) {
   return parts.length === 0 || parts.includes(null) ? null : parts.join("; ");
 }
 
-/** @param {string} text @param {Phrase | null} [phrase] */
+/** Return the sentence; null if only the service has words for it, or they are in another language.
+ * @param {string} text @param {Phrase | null} [phrase] */
 function known(text, phrase) {
   const message = phrase ? messageOf(phrase.code, phrase.values) : null;
-  return message === null ? null : ended(message, text);
+  if (message === null) return phrase && language === "en" ? text : null;
+  return ended(message, text);
 }
 
 /** Return the message of a code with its values; null without one. A value may be a sentence, too: then its code stands

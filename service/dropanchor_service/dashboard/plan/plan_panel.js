@@ -6,7 +6,7 @@ import { PlanPoints } from "./plan_points.js";
 import { isWorldFile, worldOf } from "./world_file.js";
 import { readMeasure, writeMeasure } from "../data/units.js";
 import { t } from "../i18n/language.js";
-import { refusal } from "../i18n/said.js";
+import { begun, refusal } from "../i18n/said.js";
 
 const DEGREES = 180 / Math.PI;
 
@@ -180,7 +180,7 @@ export class PlanPanel {
 
   /** @param {string} text */
   #say(text) {
-    write(this.#part("problem"), text);
+    write(this.#part("problem"), begun(text));
   }
 
   async #delete() {

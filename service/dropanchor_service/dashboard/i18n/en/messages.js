@@ -10,9 +10,8 @@ import tags from "./tags.js";
 import setup from "./setup.js";
 import zones from "./zones.js";
 import phone from "./phone.js";
-import refusals from "./refusals.js";
 import service from "./service.js";
 import share from "./share.js";
 import trail from "./trail.js";
 
-export default { ...alerts, ...find, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...refusals, ...share, ...trail };
+export default { ...alerts, ...find, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...share, ...trail };
