@@ -14,6 +14,7 @@ from dropanchor_schemas.site import Id, NumberOnly, StrictBool
 SECRET_PREFIX = "whsec_"
 ADDRESS = r"^[A-Za-z0-9.!#$%&'*+/=?^_`{|}~-]+@[A-Za-z0-9.-]+$"
 TOPIC = r"^([A-Za-z0-9._ /:-]|\{site\}|\{tag\}|\{type\})+$"
+LEVELS = r"^[A-Za-z0-9._ :-]+(/[A-Za-z0-9._ :-]+)*$"
 
 
 def _require_address(text: str) -> str:
@@ -55,6 +56,9 @@ class _Destination(BaseModel):
 
     id: Id = Field(description="Id of the destination, as in its path.")
     enabled: StrictBool = Field(default=True, description="Whether new events are queued for it.")
+
+
+class _EventDestination(_Destination):
     types: list[EventType] = Field(default=[], max_length=50, description="Only events of these types; empty: all.")
     zones: Annotated[list[Id], Field(max_length=1000)] = Field(
         default=[], description="Only events of these zones; empty: all."
@@ -64,7 +68,7 @@ class _Destination(BaseModel):
     )
 
 
-class WebhookDestination(_Destination):
+class WebhookDestination(_EventDestination):
     """A receiver of events over HTTP: one signed POST for each event."""
 
     type: Literal["webhook"]
@@ -81,7 +85,7 @@ class WebhookDestination(_Destination):
     )
 
 
-class EmailDestination(_Destination):
+class EmailDestination(_EventDestination):
     """People who get events by e-mail. The mail server is in the settings."""
 
     type: Literal["email"]
@@ -92,7 +96,7 @@ class EmailDestination(_Destination):
     language: Language = Field(default=Language.ENGLISH, description="The language of the mails: `en` or `de`.")
 
 
-class MqttDestination(_Destination):
+class MqttDestination(_EventDestination):
     """A topic of the MQTT broker in the settings: one message (QoS 1) for each event."""
 
     type: Literal["mqtt"]
@@ -102,7 +106,44 @@ class MqttDestination(_Destination):
     )
 
 
-Destination = Annotated[WebhookDestination | EmailDestination | MqttDestination, Field(discriminator="type")]
+class MqttPosesDestination(_Destination):
+    """Poses of tags and the tags in each zone, as retained messages of the MQTT broker in the settings.
+
+    They are states and no events: only the newest of each waits for a broker that is away, and none becomes a dead
+    letter.
+    """
+
+    type: Literal["mqtt_poses"]
+    enabled: StrictBool = Field(default=True, description="Whether they are published.")
+    zones: Annotated[list[Id], Field(max_length=1000)] = Field(default=[], description="Only these zones; empty: all.")
+    tags: Annotated[list[Id], Field(max_length=10_000)] = Field(default=[], description="Only these tags; empty: all.")
+    prefix: str = Field(
+        default="dropanchor",
+        pattern=LEVELS,
+        max_length=200,
+        description="What topics begin with: `<prefix>/<site>/tag/<tag>`, `…/zone/<zone>` and `…/status`.",
+    )
+    discovery: str = Field(
+        default="homeassistant",
+        pattern=f"^$|{LEVELS}",
+        max_length=200,
+        description="What the topics begin with by which Home Assistant finds tags and zones; empty: it does not.",
+    )
+    interval_s: Annotated[FiniteFloat, Field(ge=0.2, le=3600), NumberOnly] = Field(
+        default=1.0,
+        description="Least time between two poses of a tag. A change of its state or zones is sent at once.",
+    )
+    deadband_m: Annotated[FiniteFloat, Field(ge=0, le=1000), NumberOnly] = Field(
+        default=0.1,
+        description="A pose is sent when a coordinate or `sigma_pos_m` differs so much from the last one, and once a "
+        "minute.",
+    )
+
+
+EventDestination = WebhookDestination | EmailDestination | MqttDestination
+Destination = Annotated[
+    WebhookDestination | EmailDestination | MqttDestination | MqttPosesDestination, Field(discriminator="type")
+]
 
 
 class DestinationState(BaseModel):

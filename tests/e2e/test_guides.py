@@ -30,6 +30,7 @@ BY_OTHERS = {
     "back-up.md": "tests/e2e/test_backup.py",
     "generate-a-client.md": "tests/e2e/test_generated_clients.py",
     "read-exports.md": "tests/e2e/test_read_exports.py",
+    "send-poses-elsewhere.md": "tests/e2e/test_send_poses_elsewhere.py",
     "put-it-behind-a-proxy.md": "tests/e2e/test_behind_a_proxy.py",
 }
 """Pages whose samples another test runs."""

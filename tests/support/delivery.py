@@ -9,7 +9,9 @@ from typing import Any
 
 from dropanchor_schemas.destinations import Destination, WebhookDestination
 from dropanchor_schemas.events import EventType
+from dropanchor_schemas.site import Site
 from dropanchor_service.delivery.channels import Channels
+from dropanchor_service.delivery.live_site import LiveSite
 from dropanchor_service.delivery.queue import Patience
 from dropanchor_service.delivery.registry import addressees, open_destinations
 from dropanchor_service.delivery.sentences import NameOf
@@ -19,6 +21,8 @@ from dropanchor_service.events.deliveries import Deliveries, QueueState
 from dropanchor_service.events.drafts import Draft
 from dropanchor_service.events.store import EventStore
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
+from dropanchor_service.zones.items import ZoneItems
+from support.api import make_api_bench
 from support.receiver import Receiver
 
 SECRET = "whsec_ZHJvcGFuY2hvci1leGFtcGxlLXNlY3JldC0wMQ=="
@@ -46,7 +50,10 @@ class DeliveryBench:
         patience = Patience(
             retry_s=0.2, give_up_ns=round(give_up_s * 1e9), second_chance_ns=round(second_chance_s * 1e9)
         )
-        outbox = Outbox(self.destinations, self.store, self.deliveries, self.channels)
+        self.live = make_api_bench(Site(id="yard"))
+        self.zones = ZoneItems.opened(None).zones
+        live = LiveSite(self.live.answers, self.zones, self.store)
+        outbox = self.outbox = Outbox(self.destinations, self.store, self.deliveries, self.channels, live)
         self.thread = DeliveryThread([outbox], patience, time.time_ns)
 
     def put(self, destination: Destination) -> None:

@@ -68,6 +68,7 @@ BODIES: tuple[tuple[Any, Any], ...] = (
     (Destination, event_examples.WEBHOOK),
     (Destination, {"id": "shift", "type": "email", "to": ["shift@example.com"], "language": "en", "digest_s": 60}),
     (Destination, {"id": "broker", "type": "mqtt", "topic": "yard/{tag}"}),
+    (Destination, {"id": "broker", "type": "mqtt_poses", "prefix": "yard", "discovery": ""}),
     (TagSettings, examples.TAG_SETTINGS),
     (Anchor, examples.ANCHOR),
     (Site, examples.SITE),

@@ -10,9 +10,12 @@ from support.zenoh_router import wait_until
 
 
 @contextmanager
-def running_yard(folder: Path, tag: str) -> Iterator[Running]:
-    """Run the service until the block ends. Its tag has poses and a stored track, and is silent by now."""
-    config = settings_file(folder, [tag], "[site.georeference]\nlat = 52.5\nlon = 13.4\nalt_m = 34.0")
+def running_yard(folder: Path, tag: str, more: str = "") -> Iterator[Running]:
+    """Run the service until the block ends. Its tag has poses and a stored track, and is silent by now.
+
+    more: settings.
+    """
+    config = settings_file(folder, [tag], f"[site.georeference]\nlat = 52.5\nlon = 13.4\nalt_m = 34.0\n{more}")
     with running_service("--config", str(config), "--data-dir", str(folder)) as running:
         samples, content_type = encode_json(straight_north(100)), {"content-type": ENCODING_JSON}
         sent = running.ask("POST", f"/api/v1/ingest/samples?tag={tag}", content=samples, headers=content_type)

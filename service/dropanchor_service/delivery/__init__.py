@@ -1,1 +1,1 @@
-"""Deliver events to destinations: webhooks, e-mail and MQTT."""
+"""Deliver events to destinations by webhook, e-mail and MQTT, and poses by MQTT."""

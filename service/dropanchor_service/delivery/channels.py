@@ -8,7 +8,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dropanchor_schemas.destinations import Destination, EmailDestination, MqttDestination, WebhookDestination
+from dropanchor_schemas.destinations import (
+    Destination,
+    EmailDestination,
+    MqttDestination,
+    MqttPosesDestination,
+    WebhookDestination,
+)
 from dropanchor_schemas.sentences import said_by, say, with_stop
 from dropanchor_service.delivery.addresses import RefusedAddressError, UrlError, allowed, checked_url, resolved
 from dropanchor_service.delivery.channel import Channel, ChannelError, tls_context
@@ -18,7 +24,12 @@ from dropanchor_service.delivery.signature import SecretError, key_of
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
 
 if TYPE_CHECKING:
-    from dropanchor_service.delivery.mqtt import Brokers
+    from dropanchor_service.delivery.live_site import LiveSite
+    from dropanchor_service.delivery.mqtt.broker import Access, Brokers
+    from dropanchor_service.delivery.mqtt.poses import PosesFeed
+
+
+_MQTT = ("mqtt", "mqtt_poses")
 
 
 class SharedWays:
@@ -48,7 +59,7 @@ class SharedWays:
 
     @cached_property
     def brokers(self) -> "Brokers":
-        from dropanchor_service.delivery.mqtt import Brokers  # an extra
+        from dropanchor_service.delivery.mqtt.broker import Brokers  # an extra
 
         return Brokers()
 
@@ -89,11 +100,24 @@ class Channels:
 
                 page, tls = self._delivery.page, self._shared.email
                 return open_mail(destination, self._email, tls, timeout_s, self.networks, page, self._name_of)
-            case MqttDestination():
-                from dropanchor_service.delivery.mqtt import open_mqtt  # an extra
+            case MqttDestination() | MqttPosesDestination():
+                from dropanchor_service.delivery.mqtt.events import open_mqtt  # an extra
 
-                shared, networks = self._shared, self._delivery.allow_networks
-                return open_mqtt(destination, self._mqtt, shared.mqtt, timeout_s, networks, shared.brokers)
+                return open_mqtt(_topic_of_events(destination), self._broker(), self._shared.brokers)
+
+    def open_poses(
+        self, destination: MqttPosesDestination, live: "LiveSite"
+    ) -> AbstractAsyncContextManager["PosesFeed"]:
+        """Return what publishes the poses of a site as a context. It must have passed `check_settings`."""
+        from dropanchor_service.delivery.mqtt.poses import open_poses  # an extra
+
+        return open_poses(destination, live, self._broker(), self._shared.brokers)
+
+    def _broker(self) -> "Access":
+        from dropanchor_service.delivery.mqtt.broker import Access  # an extra
+
+        delivery = self._delivery
+        return Access(self._mqtt, self._shared.mqtt, delivery.timeout_s, delivery.allow_networks)
 
     def check(self, destination: Destination) -> None:
         """Raise ChannelError when nothing could be delivered. It may resolve a name, and blocks then."""
@@ -108,7 +132,7 @@ class Channels:
     def unavailable(self) -> Mapping[str, str]:
         """Return the types for which the settings lack something, each with what to do."""
         found = {}
-        for kind in ("email", "mqtt"):
+        for kind in ("email", *_MQTT):
             try:
                 self._check_type(kind)
             except ChannelError as error:
@@ -120,9 +144,9 @@ class Channels:
             raise ChannelError(
                 say("no_mail_server", "an e-mail needs a mail server: set `server` in `[email]` of the settings")
             )
-        if kind == "mqtt" and self._mqtt.server is None:
+        if kind in _MQTT and self._mqtt.server is None:
             raise ChannelError(say("no_broker", "MQTT needs a broker: set `server` in `[mqtt]` of the settings"))
-        if kind == "mqtt" and not _is_installed("paho.mqtt"):
+        if kind in _MQTT and not _is_installed("paho.mqtt"):
             raise ChannelError(say("no_mqtt", "MQTT needs the extra `mqtt`: pip install 'dropanchor-service[mqtt]'"))
 
     def _check_webhook(self, webhook: WebhookDestination) -> None:
@@ -140,6 +164,11 @@ class Channels:
             raise ChannelError(said_by(error)) from error
         except OSError:
             pass  # the name may exist later; until then the queue says what is wrong
+
+
+def _topic_of_events(destination: MqttDestination | MqttPosesDestination) -> str:
+    """Return the topic of events. A destination of poses gets none but those that test it."""
+    return destination.topic if isinstance(destination, MqttDestination) else f"{destination.prefix}/{{site}}/test"
 
 
 def _is_installed(package: str) -> bool:

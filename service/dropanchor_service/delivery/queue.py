@@ -106,7 +106,7 @@ class Queue:
         self.counts.failed_attempts += len(unavailable) + len(refused)
         if unavailable:
             self.problem = unavailable[0][1].detail
-            self.due_s = time.monotonic() + self._back_off(FIRST_RETRY_S, self.failures)
+            self.due_s = time.monotonic() + back_off_s(FIRST_RETRY_S, self.failures, self.patience.retry_s)
             self.failures += 1
 
     def _on_refusal(self, refused: list[tuple[Delivery, Outcome]]) -> None:
@@ -116,7 +116,9 @@ class Queue:
         self._bury(dead, self.problem)
         self.deliveries.refuse(self.destination, [entry.sequence for entry in again])
         now_s = time.monotonic()
-        self.waiting |= {entry.tag: now_s + self._back_off(FIRST_REFUSED_S, entry.refusals) for entry in again}
+        self.waiting |= {
+            entry.tag: now_s + back_off_s(FIRST_REFUSED_S, entry.refusals, self.patience.retry_s) for entry in again
+        }
 
     def _next_chance_s(self, now_s: float) -> list[float]:
         chance_ns = self.next_chance_ns
@@ -137,7 +139,8 @@ class Queue:
         reason = f"given up after {self.patience.give_up_ns / 3.6e12:g} hours: {self.problem}"
         self._bury(expired, reason)
 
-    def _back_off(self, first_s: float, failures: int) -> float:
-        """Return the time to the next attempt, s. It doubles, and varies so that receivers are not hit in step."""
-        wait_s = min(first_s * 2.0 ** min(failures, 20), self.patience.retry_s)
-        return wait_s * random.SystemRandom().uniform(0.75, 1.0)  # has no state that other threads share
+
+def back_off_s(first_s: float, failures: int, longest_s: float) -> float:
+    """Return the time to the next attempt, s. It doubles, and varies so that receivers are not hit in step."""
+    wait_s = min(first_s * 2.0 ** min(failures, 20), longest_s)
+    return wait_s * random.SystemRandom().uniform(0.75, 1.0)  # has no state that other threads share

@@ -6,7 +6,7 @@ from typing import Any
 
 import orjson
 
-from dropanchor_schemas.destinations import Destination
+from dropanchor_schemas.destinations import Destination, EventDestination, MqttPosesDestination
 from dropanchor_schemas.sentences import say
 from dropanchor_service.events.drafts import Draft
 from dropanchor_service.runtime.atomic_file import write_atomically
@@ -33,7 +33,8 @@ def open_destinations(folder: Path | None, recovery: Recovery | None = None) -> 
 
 def addressees(destinations: NamedItems[Destination], draft: Draft) -> Sequence[str]:
     """Return the ids of the destinations that want the event."""
-    return [destination.id for destination in destinations.all.values() if _wants(destination, draft)]
+    found = destinations.all.values()
+    return [one.id for one in found if not isinstance(one, MqttPosesDestination) and _wants(one, draft)]
 
 
 def _take_over(webhooks: Path, path: Path, recovery: Recovery) -> None:
@@ -44,7 +45,7 @@ def _take_over(webhooks: Path, path: Path, recovery: Recovery) -> None:
         write_atomically(path, [orjson.dumps(destinations)], PRIVATE)
 
 
-def _wants(destination: Destination, draft: Draft) -> bool:
+def _wants(destination: EventDestination, draft: Draft) -> bool:
     types = {draft.type, draft.data.get("retracted_type")}  # who got an event learns that it is not true
     return (
         destination.enabled

@@ -10,10 +10,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 
-from dropanchor_schemas.destinations import Destination
+from dropanchor_schemas.destinations import Destination, MqttPosesDestination
 from dropanchor_service.delivery.channel import ChannelError
 from dropanchor_service.delivery.channels import Channels
-from dropanchor_service.delivery.queue import REREAD_S, Counts, Patience, Queue
+from dropanchor_service.delivery.live_site import LiveSite
+from dropanchor_service.delivery.queue import FIRST_RETRY_S, REREAD_S, Counts, Patience, Queue, back_off_s
 from dropanchor_service.events.deliveries import Deliveries
 from dropanchor_service.events.store import EventStore
 from dropanchor_service.runtime.logs import RareLog
@@ -28,12 +29,13 @@ Name = tuple[int, str]
 
 @dataclass(frozen=True)
 class Outbox:
-    """The destinations of one site, its events and their queues."""
+    """The destinations of one site, its events and their queues, and what it has now."""
 
     destinations: NamedItems[Destination]
     store: EventStore
     deliveries: Deliveries
     channels: Channels
+    live: LiveSite
 
 
 class DeliveryThread(Worker):
@@ -57,6 +59,7 @@ class DeliveryThread(Worker):
             site.deliveries.on_retry(partial(self._note, self._with_news, index))
         self._served: dict[Name, Destination] = {}
         self._queues: dict[Name, Queue] = {}
+        self._problems: dict[Name, str | None] = {}  # of destinations without a queue
         self._tasks: dict[Name, asyncio.Task[None]] = {}
         self._ended: deque[asyncio.Task[None]] = deque()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -81,7 +84,7 @@ class DeliveryThread(Worker):
     def problem_of(self, site: int, destination: str) -> str | None:
         """Return what went wrong at the last attempt, None if nothing did."""
         queue = self._queues.get((site, destination))
-        return None if queue is None else queue.problem
+        return self._problems.get((site, destination)) if queue is None else queue.problem
 
     def _run(self) -> None:
         asyncio.run(self._deliver_all())
@@ -117,8 +120,13 @@ class DeliveryThread(Worker):
     def _begin(self, name: Name, destination: Destination) -> None:
         site = self._sites[name[0]]
         self._served[name] = destination
-        queue = self._queues[name] = Queue(destination.id, site.deliveries, self._patience, self.counts, self._now_ns)
-        task = self._tasks[name] = asyncio.create_task(self._deliver(destination, queue, site.channels))
+        if isinstance(destination, MqttPosesDestination):
+            work = self._publish(name, destination)
+        else:
+            queue = Queue(destination.id, site.deliveries, self._patience, self.counts, self._now_ns)
+            self._queues[name] = queue
+            work = self._deliver(destination, queue, site.channels)
+        task = self._tasks[name] = asyncio.create_task(work)
         task.add_done_callback(self._on_end)
 
     def _on_end(self, task: asyncio.Task[None]) -> None:
@@ -129,7 +137,9 @@ class DeliveryThread(Worker):
         task = self._tasks.pop(name)
         task.cancel()
         await asyncio.wait([task])
-        del self._queues[name], self._served[name]
+        self._queues.pop(name, None)
+        self._problems.pop(name, None)
+        del self._served[name]
 
     async def _deliver(self, destination: Destination, queue: Queue, channels: Channels) -> None:
         """Empty the queue of one destination, again and again."""
@@ -148,6 +158,34 @@ class DeliveryThread(Worker):
                     is_empty, queue.due_s = True, time.monotonic() + REREAD_S
                 if is_empty:
                     await queue.rest()
+
+    async def _publish(self, name: Name, destination: MqttPosesDestination) -> None:
+        """Publish the poses and zones of a site, again and again."""
+        site, failures = self._sites[name[0]], 0
+        try:
+            site.channels.check_settings(destination)
+        except ChannelError as error:
+            self._problems[name] = str(error)
+            return
+        if not destination.enabled:
+            return
+        async with site.channels.open_poses(destination, site.live) as feed:
+            try:
+                while True:
+                    self._problems[name] = await feed.publish()
+                    failures = failures + 1 if feed.is_away else 0
+                    pause_s = back_off_s(FIRST_RETRY_S, failures - 1, self._patience.retry_s)
+                    await asyncio.sleep(pause_s if failures else feed.pause_s)
+            finally:
+                if not self._stop.is_set() and _is_elsewhere(site.destinations.all.get(destination.id), destination):
+                    await feed.clear()
+
+
+def _is_elsewhere(now: Destination | None, before: MqttPosesDestination) -> bool:
+    """Return whether a destination that was deleted or changed no longer publishes to the same topics."""
+    if not isinstance(now, MqttPosesDestination):
+        return True
+    return (now.prefix, now.discovery) != (before.prefix, before.discovery)
 
 
 def _taken(indices: deque[int]) -> set[int]:

@@ -139,10 +139,15 @@ class EventStore:
 
     def occupancy(self) -> list[tuple[str, int]]:
         """Return each zone that is not empty, and how many tags are inside."""
-        if not self.database.is_made:
-            return []
-        rows = self.database.rows("SELECT item, count(*) FROM states WHERE source = 'zone' GROUP BY item")
-        return [(zone, tags) for zone, tags in rows]
+        return [(zone, len(tags)) for zone, tags in self.occupants().items()]
+
+    def occupants(self) -> dict[str, list[str]]:
+        """Return the tags in each zone that is not empty."""
+        inside: dict[str, list[str]] = {}
+        sql = "SELECT item, tag FROM states WHERE source = 'zone' ORDER BY item, tag"
+        for zone, tag in self.database.rows(sql) if self.database.is_made else ():
+            inside.setdefault(zone, []).append(tag)
+        return inside
 
     def forget(self, source: str, items: Sequence[str]) -> None:
         """Delete the states of zones or rules that no longer exist."""

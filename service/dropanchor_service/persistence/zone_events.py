@@ -7,8 +7,10 @@ from functools import partial
 from typing import NamedTuple, Self
 from urllib.parse import quote
 
+from dropanchor_service.answers.answers import Answers
 from dropanchor_service.delivery.channels import Channels, SharedWays
 from dropanchor_service.delivery.event_parts import EventParts
+from dropanchor_service.delivery.live_site import LiveSite
 from dropanchor_service.delivery.queue import Patience
 from dropanchor_service.delivery.receiver_networks import ReceiverNetworks, open_networks
 from dropanchor_service.delivery.registry import addressees, open_destinations
@@ -61,7 +63,7 @@ class ZoneEvents:
         self._sites = sites
         self._now_ns = now_ns
         shared = _shared_ways(settings)
-        opened = [self._open(settings, site, shared, several=len(sites) > 1) for site in sites]
+        opened = [self._open(settings, site, latest, shared, several=len(sites) > 1) for site in sites]
         outboxes = [one.outbox for one in opened]
         self.stores = [outbox.store for outbox in outboxes]
         patience = Patience(settings.delivery.retry_s, round(settings.delivery.give_up_hours * 3600e9))
@@ -84,7 +86,9 @@ class ZoneEvents:
             ChangeTrail(outbox.store.database, self._now_ns),
         )
 
-    def _open(self, settings: Settings, site: ServedSite, shared: SharedWays, several: bool) -> _Opened:
+    def _open(
+        self, settings: Settings, site: ServedSite, latest: LatestPoses, shared: SharedWays, several: bool
+    ) -> _Opened:
         folder = settings_of(settings, site.id).data_dir
         try:
             items, destinations = ZoneItems.opened(folder, self._recovery), open_destinations(folder, self._recovery)
@@ -99,7 +103,8 @@ class ZoneEvents:
             raise SettingsError(f"data_dir: zones or events in {folder} cannot be read: {error}") from error
         delivery = _with_page_of(settings.delivery, site.id) if several else settings.delivery
         channels = Channels(delivery, settings.email, settings.mqtt, partial(_name_of, site.store), shared, networks)
-        return _Opened(items, Outbox(destinations, store, Deliveries(database), channels), watched)
+        live = LiveSite(Answers(site.store, site.tags, latest, self._now_ns), items.zones, store)
+        return _Opened(items, Outbox(destinations, store, Deliveries(database), channels, live), watched)
 
     def __enter__(self) -> Self:
         self._closing.enter_context(self._delivery)

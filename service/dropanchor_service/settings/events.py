@@ -86,9 +86,12 @@ class EmailSettings(_ServerSettings):
 
 
 class MqttSettings(_ServerSettings):
-    """The MQTT 5 broker that events are published to. It needs the extra `mqtt`."""
+    """The MQTT broker that events and poses are published to. It needs the extra `mqtt`."""
 
     tls: bool = Field(default=True, description="Connect with TLS (port 8883), or without it (1883).")
+    version: Literal["5", "3.1.1"] = Field(
+        default="5", description="Of MQTT. A broker cannot say in `3.1.1` that it refuses a message."
+    )
 
     @property
     def is_encrypted(self) -> bool:

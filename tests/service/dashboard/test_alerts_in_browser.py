@@ -6,14 +6,14 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Locator, expect
 
-from dropanchor_schemas.destinations import EmailDestination, WebhookDestination
+from dropanchor_schemas.destinations import EmailDestination, MqttPosesDestination, WebhookDestination
 from dropanchor_schemas.zones import BatteryLowRule, TooCloseRule
 from dropanchor_service.delivery.signature import key_of
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
 from dropanchor_service.settings.events import EmailSettings
 from service.dashboard.alert_place import SECRET, alert_place, happen, put_mail
-from service.dashboard.zone_place import served
+from service.dashboard.zone_place import ZonePlace, served
 from support.browser import WatchedPage, open_page, watched_page
 from support.mail_server import MailServer, running_mail_server
 from support.zenoh_router import wait_until
@@ -152,6 +152,22 @@ def test_dead_letters_are_shown_sent_again_and_dropped(chromium: Browser) -> Non
         page.page.get_by_role("button", name="Drop", exact=True).last.click()
         wait_until(lambda: place.parts.deliveries.states()["shift"][:2] == (1, 0))
         expect(alerts.get_by_role("list", name="Destinations").get_by_text("1 event waiting")).to_be_visible()
+        check_poses(place, alerts)
+
+
+def check_poses(place: ZonePlace, alerts: Locator) -> None:
+    """Make a destination of poses, which has no events to choose."""
+    alerts.get_by_role("button", name="Poses by MQTT").click()
+    form = alerts.get_by_role("form", name="Destination", exact=True)
+    expect(form.get_by_label("Too long in a zone")).to_be_hidden()
+    form.get_by_label("Name").fill("House")
+    form.get_by_label("Moved by at least").fill("0.5")
+    form.get_by_label("Home Assistant looks below").fill("")
+    form.get_by_role("button", name="Save destination").click()
+    expect(alerts.get_by_role("list", name="Destinations")).to_contain_text("poses in the MQTT topics dropanchor/…")
+    made = place.parts.destinations.all["house"]
+    assert isinstance(made, MqttPosesDestination)
+    assert (made.deadband_m, made.interval_s, made.discovery, made.enabled) == (0.5, 1.0, "", True)
 
 
 def test_rules_are_made_and_edited_and_those_of_zones_lead_to_the_zone(chromium: Browser) -> None:

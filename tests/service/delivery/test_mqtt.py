@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from paho.mqtt.client import Client
 from dropanchor_schemas.destinations import MqttDestination
 from dropanchor_service.delivery import queue
 from dropanchor_service.delivery.queue import Patience
-from dropanchor_service.delivery.thread import DeliveryThread, Outbox
+from dropanchor_service.delivery.thread import DeliveryThread
 from dropanchor_service.settings.events import MqttSettings
 from service.delivery.names import resolve_to_loopback
 from support.certificate import self_signed
@@ -161,7 +162,7 @@ def test_the_destinations_of_all_sites_share_one_connection_and_one_thread(tmp_p
         shared, outboxes = benches[0].channels, []
         for bench in benches:
             put(bench)
-            outboxes.append(Outbox(bench.destinations, bench.store, bench.deliveries, shared))
+            outboxes.append(replace(bench.outbox, channels=shared))
         before = threading.active_count()
         with DeliveryThread(outboxes, Patience(0.2, 10**15), time.time_ns):
             for bench in benches:

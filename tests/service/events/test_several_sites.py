@@ -11,7 +11,7 @@ import pytest
 from dropanchor_schemas.events import Event
 from dropanchor_schemas.zones import AmbiguousRule, TooCloseRule
 from dropanchor_service.delivery.queue import Patience
-from dropanchor_service.delivery.thread import DeliveryThread, Outbox
+from dropanchor_service.delivery.thread import DeliveryThread
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State
 from dropanchor_service.events.database import FILE_NAME, Database
 from dropanchor_service.events.site_watch import WatchedSite
@@ -136,7 +136,7 @@ def test_a_site_without_events_has_no_file_of_them(tmp_path: Path) -> None:
 
 def test_destinations_of_equal_names_get_the_events_of_their_site_and_a_storm_of_one_delays_no_other() -> None:
     benches, receivers = [DeliveryBench(timeout_s=20.0) for _ in range(2)], [Receiver(), Receiver()]
-    outboxes = [Outbox(one.destinations, one.store, one.deliveries, one.channels) for one in benches]
+    outboxes = [one.outbox for one in benches]
     thread = DeliveryThread(outboxes, Patience(0.2, 10**15), time.time_ns)
     with running_receiver(receivers[0]), running_receiver(receivers[1]), thread:
         for bench, receiver in zip(benches, receivers, strict=True):

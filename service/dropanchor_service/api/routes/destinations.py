@@ -12,6 +12,7 @@ from dropanchor_schemas.destinations import (
     DestinationList,
     DestinationState,
     DestinationTest,
+    MqttPosesDestination,
     Retried,
     WebhookDestination,
 )
@@ -72,7 +73,8 @@ def get_destination(destination: DestinationId, request: Request) -> Response:
     operation_id="put_destination",
     summary="Create or replace a destination",
     description="It gets the events from now on. A webhook inside needs its network among those of receivers: a "
-    "refusal for that names it as `network`. An e-mail needs a mail server, and MQTT a broker.",
+    "refusal for that names it as `network`. An e-mail needs a mail server, and MQTT a broker. The poses of "
+    "`mqtt_poses` are no events: they have no queue.",
     response_model=DestinationState,
     responses=example_response(examples.DESTINATION_STATE) | problems(Kind.DESTINATION_REFUSED, *CHANGE_KINDS, *_READ),
 )
@@ -85,6 +87,9 @@ def put_destination(
     parts = parts_of(request).events
     usable = _usable(parts, body)
     put(parts.destinations, destination, body.id, usable, allows)
+    if isinstance(usable, MqttPosesDestination):  # which has no queue, if it was of another type before
+        with reading():
+            parts.deliveries.drop(destination)
     return _response(parts, usable)
 
 

@@ -20,6 +20,7 @@ const NEW_DESTINATIONS = {
   email: { ...COMMON, type: "email", to: [], digest_s: 60, language },
   webhook: { ...COMMON, type: "webhook", url: "", secret: null },
   mqtt: { ...COMMON, type: "mqtt", topic: "dropanchor/{site}/{tag}/event" },
+  mqtt_poses: { enabled: true, zones: [], tags: [], type: "mqtt_poses", prefix: "dropanchor", discovery: "homeassistant", interval_s: 1, deadband_m: 0.1 },
 };
 const FOR_ALL = { name: "", tags: [], groups: [] };
 /** @type {Record<string, Record<string, any>>} */

@@ -7,8 +7,8 @@ import { has, t } from "../i18n/language.js";
 /** @typedef {{destination: Item, has_secret: boolean, pending: number, oldest_ns: number | null, dead: number, problem: string | null}} DestinationState */
 
 /** Return where events go, such as `e-mail to shift@example.com`. @param {Item} destination */
-export function whereTo({ type, to, url, topic }) {
-  return has(`destination.${type}_to`) ? t(`destination.${type}_to`, { to: (to ?? []).join(", "), url, topic }) : type;
+export function whereTo({ type, to, url, topic, prefix }) {
+  return has(`destination.${type}_to`) ? t(`destination.${type}_to`, { to: (to ?? []).join(", "), url, topic, prefix }) : type;
 }
 
 /** Return the state of a queue in words. @param {DestinationState} state */

@@ -29,9 +29,11 @@ def webhook(**changes: Any) -> dict[str, Any]:
     return {"id": "mes", "type": "webhook", "url": "http://127.0.0.1:9/", "secret": SECRET} | changes
 
 
-def with_loopback(folder: Path | None = None, email: EmailSettings | None = None) -> EventParts:
+def with_loopback(
+    folder: Path | None = None, email: EmailSettings | None = None, mqtt: MqttSettings | None = None
+) -> EventParts:
     delivery = DeliverySettings(allow_networks=(ipaddress.ip_network("127.0.0.0/8"),), timeout_s=60.0)
-    channels = Channels(delivery, email or EmailSettings(), MqttSettings())
+    channels = Channels(delivery, email or EmailSettings(), mqtt or MqttSettings())
     return replace(EventParts.in_memory("yard"), channels=channels, destinations=open_destinations(folder))
 
 
@@ -53,6 +55,7 @@ def test_the_list_says_what_the_settings_lack_before_anybody_fills_a_form() -> N
     assert lacking == {
         "email": "an e-mail needs a mail server: set `server` in `[email]` of the settings.",
         "mqtt": "MQTT needs a broker: set `server` in `[mqtt]` of the settings.",
+        "mqtt_poses": "MQTT needs a broker: set `server` in `[mqtt]` of the settings.",
     }
 
 
@@ -120,6 +123,7 @@ def test_webhooks_of_an_older_service_become_destinations(tmp_path: Path) -> Non
         (webhook(secret="whsec_c2hvcnQ="), "(New secret)"),
         ({"id": "mes", "type": "email", "to": ["shift@example.com"]}, "`[email]`"),
         ({"id": "mes", "type": "mqtt"}, "`[mqtt]`"),
+        ({"id": "mes", "type": "mqtt_poses"}, "`[mqtt]`"),
     ],
 )
 def test_a_destination_that_cannot_work_is_refused_with_a_sentence(body: Mapping[str, Any], words: str) -> None:
@@ -136,6 +140,9 @@ def test_a_destination_that_cannot_work_is_refused_with_a_sentence(body: Mapping
         {"type": "email", "to": ["shift@example.com\r\nBcc: all@example.com"]},
         {"type": "mqtt", "topic": "yard/#"},
         {"type": "mqtt", "topic": "yard/{tag.__class__}"},
+        {"type": "mqtt_poses", "prefix": "yard/#"},
+        {"type": "mqtt_poses", "discovery": "/homeassistant"},
+        {"type": "mqtt_poses", "types": ["dropanchor.zone.enter"]},
         {"type": "pigeon"},
     ],
 )
@@ -166,6 +173,23 @@ def test_a_test_mail_says_which_recipient_the_server_refuses() -> None:
         tested = ask(app, "POST", f"{MES}/test").json()
     assert tested == {"delivered": True, "detail": "gone@example.com was refused: 550 no such user"}
     assert "This is a test of the destination mes" in server.mails[0]["Subject"]
+
+
+def test_a_destination_of_poses_gets_a_test_message_and_keeps_no_queue_of_its_former_type() -> None:
+    parts = with_loopback(mqtt=MqttSettings(server="127.0.0.1", port=9, tls=False))
+    app = app_of(parts)
+    ask(app, "PUT", MES, json=webhook())
+    with parts.store.database.transaction() as connection:
+        connection.execute("INSERT INTO deliveries VALUES ('mes', 1, 0, NULL, NULL)")
+    happen(parts, "a")
+    assert ask(app, "GET", MES).json()["pending"] == 1
+    made = ask(app, "PUT", MES, json={"id": "mes", "type": "mqtt_poses", "tags": ["a"]}).json()
+    assert (made["pending"], made["destination"]["prefix"], made["has_secret"]) == (0, "dropanchor", False)
+    happen(parts, "a")
+    assert ask(app, "GET", MES).json()["pending"] == 0
+    tested = ask(app, "POST", f"{MES}/test").json()
+    assert tested["delivered"] is False
+    assert "127.0.0.1:9 cannot be reached" in tested["detail"]
 
 
 def test_dead_letters_are_listed_sent_again_dropped_and_go_with_their_destination() -> None:

@@ -1,0 +1,1 @@
+"""Publish events, poses and zones to the MQTT broker of the settings."""
