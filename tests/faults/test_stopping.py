@@ -27,7 +27,7 @@ def open_stuck_clients(opened: ExitStack, address: str, sent: bytes) -> None:
 def test_a_signal_ends_a_busy_service_with_stuck_clients_without_loss(tmp_path: Path) -> None:
     endpoint = free_endpoint()
     tags = LiveTags(endpoint, TAGS, SEED, cache_messages=6000)
-    config = tags.write_settings(tmp_path, "checkpoint_s = 3600")  # only the checkpoint at the end is written
+    config = tags.write_settings(tmp_path, "checkpoint_s = 3600")  # only a first one and the one at the end are written
     options = ("--config", str(config), "--data-dir", str(tmp_path / "data"), "--zenoh-connect", endpoint)
     with router_process(endpoint):
         with tags, running_service(*options) as service, ExitStack() as opened:
@@ -45,4 +45,4 @@ def test_a_signal_ends_a_busy_service_with_stuck_clients_without_loss(tmp_path: 
             after = samples_of(service)
     assert after.keys() == before.keys()
     assert all(after[tag][kind] >= count for tag, counts in before.items() for kind, count in counts.items())
-    assert len(list((tmp_path / "data" / "checkpoints").iterdir())) <= 2
+    assert len(list((tmp_path / "data" / "checkpoints").iterdir())) <= 6  # two whole ones, two that continue each

@@ -26,7 +26,7 @@ class Run:
         self.engine = RecordingEngine()
         self.bench = IngestBench(engine=self.engine, folder=folder, tags=starts)
         self.state = self.bench.service_state()
-        self.checkpoints = CheckpointFolder(folder / "checkpoints", self.state.layout, self.state.decoded)
+        self.checkpoints = CheckpointFolder(folder / "checkpoints", self.state.layout, self.state.as_present)
 
     def fuse(self, message: Message) -> list[bytes]:
         """Fuse one message and return the bits of each batch that the engine returned for it."""

@@ -17,7 +17,7 @@ from dropanchor_schemas.site import TagSettings
 from dropanchor_schemas.zones import BatteryLowRule
 from dropanchor_service.api.routes.plan_examples import PLAN
 from dropanchor_service.checkpoints.files import CheckpointFolder
-from dropanchor_service.checkpoints.format import Snapshot, UnreadableLayoutError, decoded
+from dropanchor_service.checkpoints.format import Snapshot, UnreadableLayoutError
 from dropanchor_service.checkpoints.layouts import why_unreadable
 from dropanchor_service.delivery.receiver_networks import AllowedNetwork
 from dropanchor_service.estimation.columns import POSE
@@ -89,7 +89,7 @@ class Parts:
         assert self.persistence.tracks is not None
         self.tracks = self.persistence.tracks
         folder = self.folder / "checkpoints"
-        self.checkpoints = CheckpointFolder(folder, "layout", decode, self.recovery)
+        self.checkpoints = CheckpointFolder(folder, "layout", as_present, self.recovery)
 
     def close(self) -> None:
         if hasattr(self, "zone_events"):
@@ -116,8 +116,8 @@ class Parts:
         self.omlox.fences.put("t", Fence.model_validate({"region": {"type": "Point", "coordinates": [0.0, 0.0]}}))
         with self.tracks:
             self.tracks.keep(poses_of_cart())
-        for value in (1, 2):
-            self.checkpoints.write(Snapshot({}, {"value": value}))
+        for value in (1, 2):  # each by another process, so both are whole
+            CheckpointFolder(self.folder / "checkpoints", "layout", as_present).write(Snapshot({}, {"value": value}))
         return self.links.add("default", ShareRequest(name="crew", valid_s=1_000_000))[1]
 
     def held(self, token: str) -> dict[str, bool]:
@@ -144,8 +144,7 @@ class Parts:
         }
 
 
-def decode(whole: bytes) -> Snapshot:
-    layout, found = decoded(whole)
+def as_present(layout: str, found: Snapshot) -> Snapshot:
     if (why := why_unreadable(layout, "layout")) is not None:
         raise UnreadableLayoutError(f"its layout is {why}")
     return found

@@ -30,7 +30,7 @@ def main() -> None:
         warmed_up = _signatures()
         _send(before, messages[:half])
         state, after = before.service_state(), _bench(Path(folder) / "after")
-        checkpoints = CheckpointFolder(Path(folder) / "checkpoints", state.layout, state.decoded)
+        checkpoints = CheckpointFolder(Path(folder) / "checkpoints", state.layout, state.as_present)
         checkpoints.write(state.snapshot())
         found, _ = checkpoints.newest()
         assert found is not None

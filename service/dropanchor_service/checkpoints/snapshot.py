@@ -7,7 +7,7 @@ import numpy as np
 
 from dropanchor_schemas.keys import NOT_IDS
 from dropanchor_schemas.site import Anchor
-from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, UnreadableLayoutError, decoded
+from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, UnreadableLayoutError
 from dropanchor_service.checkpoints.layouts import name_of, version_of, why_unreadable
 from dropanchor_service.checkpoints.migrations import as_they_are, migrated
 from dropanchor_service.estimation.columns import Array
@@ -49,9 +49,8 @@ class ServiceState:
         arrays |= {f"engine.{name}": array for name, array in self._engine.state().items()}
         return Snapshot({name: self._copied(name, array) for name, array in arrays.items()}, self._document())
 
-    def decoded(self, whole: bytes) -> Snapshot:
-        """Return the snapshot in the bytes of a checkpoint, in this layout. Raises CheckpointError."""
-        layout, found = decoded(whole)
+    def as_present(self, layout: str, found: Snapshot) -> Snapshot:
+        """Return a snapshot of this or an earlier layout in this one. Raises CheckpointError."""
         why_not = why_unreadable(layout, self.layout)
         if why_not is not None:
             raise UnreadableLayoutError(f"its layout is {why_not}")

@@ -11,8 +11,11 @@ from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.runtime.worker import Worker
 
-OLD_S = 5.0  # an older newest checkpoint is a problem
+OLD_S = 5.0  # a newest checkpoint that is so much older than the pause is a problem
+WEAR_BYTES_S = 70_000  # a pause is so long that no more is written in a second, so that a card lives for years
+LONGEST_S = 6.0  # pause because of that: what tags without a cache send in a pause is lost if the service is killed
 REST = 3  # pause, relative to the duration of the last write, so that a slow disk is not always busy
+FIRST_S = 0.25  # pause before the first: of a tag that no checkpoint has, the caches are asked for 100 messages only
 _TURN_S = 1.0  # wait for a turn of the ingest thread
 
 _log = logging.getLogger(__name__)
@@ -34,10 +37,10 @@ class CheckpointThread(Worker):
         self._requested = threading.Event()
         self._taken = threading.Event()
         self._snapshot: Snapshot | None = None
-        self._messages = -1  # in the newest checkpoint
+        self._messages = 0  # in the newest checkpoint of this process
         self._current_s = time.monotonic()  # when the newest checkpoint, or the loaded one, was last up to date
         self._error: str | None = None
-        self._took_s = 0.0
+        self._pause_s = min(period_s, FIRST_S)
         metrics.checkpoint_age.set_function(lambda: self.age_s)
 
     def load(self) -> None:
@@ -89,7 +92,7 @@ class CheckpointThread(Worker):
     @property
     def problem(self) -> str | None:
         """Return why a killed service would lose its state, None if it would not."""
-        if self.age_s < OLD_S:
+        if self.age_s < self._pause_s + OLD_S:
             return None
         return f"the newest checkpoint is {self.age_s:.0f} s old: {self._error or 'no snapshot could be taken'}"
 
@@ -111,7 +114,7 @@ class CheckpointThread(Worker):
             self._snapshot, self._of = self._state.snapshot(), (messages, now_s)
 
     def _run(self) -> None:
-        while not self._stop.wait(max(self._period_s, REST * self._took_s)):
+        while not self._stop.wait(self._pause_s):
             self._taken.clear()
             self._requested.set()
             # Request no other one before: a snapshot must not be overwritten while it is being written.
@@ -137,7 +140,8 @@ class CheckpointThread(Worker):
             self._metrics.checkpoints.labels("failed").inc()
             self._log.exception("checkpoint", error)
             return
-        self._took_s = time.monotonic() - began_s  # of a write that failed it says nothing: it may have waited in vain
+        took_s = time.monotonic() - began_s  # of a write that failed it says nothing: it may have waited in vain
+        self._pause_s = max(self._period_s, REST * took_s, min(LONGEST_S, size / WEAR_BYTES_S))
         self._messages, self._current_s = self._of
         self._metrics.checkpoints.labels("written").inc()
         self._metrics.checkpoint_bytes.set(size)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from dropanchor_service.checkpoints.format import CheckpointError, Decode, Snapshot, encoded
+from dropanchor_service.checkpoints.format import AsPresent, CheckpointError, Snapshot, decoded, encoded, size_of
 from dropanchor_service.cluster.database import Connection, DatabaseError, sentence_of
 from dropanchor_service.cluster.leases import Claim
 
@@ -34,13 +34,13 @@ class CheckpointObjects:
     """
 
     def __init__(
-        self, connect: Callable[[], Connection], bucket: str, folder: "ObjectFolder", layout: str, decode: Decode
+        self, connect: Callable[[], Connection], bucket: str, folder: "ObjectFolder", layout: str, as_present: AsPresent
     ) -> None:
         self.layout = layout
         self._connect = connect
         self._bucket = bucket
         self._folder = folder
-        self._decode = decode
+        self._as_present = as_present
         self._connection: Connection | None = None
         self._claim = Claim(0, b"", {})
         self._written = 0
@@ -54,7 +54,7 @@ class CheckpointObjects:
     def write(self, snapshot: Snapshot) -> int:
         """Write the checkpoint, and name it in the row; see `Checkpoints`."""
         parts = encoded(snapshot, self.layout)
-        size = sum(memoryview(part).nbytes for part in parts)
+        size = size_of(parts)
         number = f"{self._claim.epoch:012d}-{self._written + 1:012d}-{secrets.token_hex(4)}"
         name = f"{self._bucket}/{number}"
         self._folder.write(name, parts)
@@ -122,7 +122,7 @@ class CheckpointObjects:
                 complaints.append(f"{name} is not used: {self._folder.url} does not have it")
                 continue
             try:
-                return self._decode(content), complaints
+                return self._as_present(*decoded(content)), complaints
             except CheckpointError as error:
                 complaints.append(f"{name} is not used: {error}")
         return None, complaints

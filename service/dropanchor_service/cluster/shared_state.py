@@ -6,7 +6,7 @@ Each write holds only while nobody has a higher epoch.
 from collections.abc import Callable
 from threading import Lock
 
-from dropanchor_service.checkpoints.format import CheckpointError, Decode, Snapshot, encoded
+from dropanchor_service.checkpoints.format import AsPresent, CheckpointError, Snapshot, decoded, encoded
 from dropanchor_service.cluster.database import Connection, DatabaseError, sentence_of
 from dropanchor_service.cluster.leases import Claim
 
@@ -27,11 +27,11 @@ class CheckpointRow:
     connect: raises DatabaseError. layout: in which it is written.
     """
 
-    def __init__(self, connect: Callable[[], Connection], bucket: str, layout: str, decode: Decode) -> None:
+    def __init__(self, connect: Callable[[], Connection], bucket: str, layout: str, as_present: AsPresent) -> None:
         self.layout = layout
         self._connect = connect
         self._bucket = bucket
-        self._decode = decode
+        self._as_present = as_present
         self._connection: Connection | None = None
         self._claim = Claim(0, b"", {})
         self._lock = Lock()
@@ -68,7 +68,7 @@ class CheckpointRow:
             named = self._claim.object
             return None, [f"the checkpoint {named} is not used: cluster.checkpoints is not set"] if named else []
         try:
-            return self._decode(self._claim.checkpoint), []
+            return self._as_present(*decoded(self._claim.checkpoint)), []
         except CheckpointError as error:
             return None, [f"the checkpoint of the bucket {self._bucket} is not used: {error}"]
 

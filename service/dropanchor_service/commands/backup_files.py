@@ -15,7 +15,7 @@ from pathlib import Path
 
 import orjson
 
-from dropanchor_service.checkpoints.format import CheckpointError, decoded
+from dropanchor_service.checkpoints.format import CheckpointError, unsealed
 from dropanchor_service.history.sqlite.damaged_file import is_damage
 from dropanchor_service.runtime.data_files import OF_SERVICE
 from dropanchor_service.runtime.recovery import COPY
@@ -135,7 +135,7 @@ def _check(copy: Path) -> None:
     elif copy.suffix == ".json" or copy.name.endswith(f".json{COPY}"):
         orjson.loads(copy.read_bytes())
     elif copy.name.startswith("checkpoint-"):
-        decoded(copy.read_bytes())
+        unsealed(copy.read_bytes())
 
 
 def _write_checksums(backup: Path) -> None:

@@ -52,7 +52,7 @@ class Ownership:
         """Return the place for checkpoints, None if there is none. recovery: reports those that are damaged."""
         if self._folder is None:
             return None
-        return CheckpointFolder(self._folder / "checkpoints", state.layout, state.decoded, recovery)
+        return CheckpointFolder(self._folder / "checkpoints", state.layout, state.as_present, recovery)
 
     def stand_by(self, page: str, shared: Mapping[str, Shared], hears_others: Callable[[], bool]) -> None:
         """Return when this process serves the sites.

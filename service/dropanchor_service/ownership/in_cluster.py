@@ -91,9 +91,9 @@ class ClusterOwnership(Ownership):
         recovery: Recovery,  # noqa: ARG002 - the database and the store keep no damaged ones
     ) -> CheckpointRow | CheckpointObjects:
         if self._objects is None:
-            self._kept = CheckpointRow(self._connect, self._bucket, state.layout, state.decoded)
+            self._kept = CheckpointRow(self._connect, self._bucket, state.layout, state.as_present)
         else:
-            self._kept = CheckpointObjects(self._connect, self._bucket, self._objects, state.layout, state.decoded)
+            self._kept = CheckpointObjects(self._connect, self._bucket, self._objects, state.layout, state.as_present)
         return self._kept
 
     def stand_by(self, page: str, shared: Mapping[str, Shared], hears_others: Callable[[], bool]) -> None:

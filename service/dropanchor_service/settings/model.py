@@ -163,7 +163,9 @@ class Settings(_Section):
         "forgets everything.",
     )
     checkpoint_s: Annotated[float, Field(gt=0, le=3600)] = Field(
-        default=0.5, description="Time between checkpoints: what a killed service has to fetch again."
+        default=1.0,
+        description="Time between checkpoints: what a killed service has to fetch again. It is longer, up to 6 s, "
+        "while many tags move, so that a memory card lives for years.",
     )
     unknown_tags: UnknownTags = Field(
         default="accept",

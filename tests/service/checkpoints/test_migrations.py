@@ -28,7 +28,7 @@ def reloaded(folder: Path, whole: bytes) -> Drive:
     (folder / "checkpoints").mkdir()
     (folder / "checkpoints" / "checkpoint-000000000007").write_bytes(whole)
     drive = Drive(folder)
-    kept = CheckpointFolder(folder / "checkpoints", drive.state.layout, drive.state.decoded)
+    kept = CheckpointFolder(folder / "checkpoints", drive.state.layout, drive.state.as_present)
     CheckpointThread(drive.state, kept, drive.bench.metrics, 1.0, drive.bench.clock).load()
     return drive
 
@@ -95,8 +95,8 @@ def earlier(present: Snapshot) -> Snapshot:
 
 def test_equal_columns_are_copied_new_ones_are_those_of_a_fresh_tag_and_dropped_ones_go(tmp_path: Path) -> None:
     drive = Drive(tmp_path)
-    present = drive.state.decoded(golden(layouts.VERSION - 1))
-    found = drive.state.decoded(b"".join(encoded(earlier(present), EARLIER)))
+    present = drive.state.as_present(*decoded(golden(layouts.VERSION - 1)))
+    found = drive.state.as_present(EARLIER, earlier(present))
     assert found.dtypes == present.dtypes
     assert all(
         found.arrays[name].dtype.isalignedstruct == array.dtype.isalignedstruct
@@ -123,7 +123,7 @@ def test_equal_columns_are_copied_new_ones_are_those_of_a_fresh_tag_and_dropped_
 def test_a_changed_column_needs_a_step_or_the_checkpoint_is_refused_and_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    present = Drive(tmp_path).state.decoded(golden(layouts.VERSION - 1))
+    present = Drive(tmp_path).state.as_present(*decoded(golden(layouts.VERSION - 1)))
     counts = present.arrays["counts"]
     fewer = np.zeros(len(counts), [("messages", "f4"), ("samples", "i8", 2)])
     fewer["messages"] = counts["messages"]
@@ -139,7 +139,7 @@ def test_a_changed_column_needs_a_step_or_the_checkpoint_is_refused_and_kept(
         return Snapshot(found.arrays | {"counts": new}, found.document)
 
     monkeypatch.setitem(STEPS, layouts.VERSION - 1, step)
-    assert drive.state.decoded(whole).arrays["counts"]["messages"].tolist() == counts["messages"].tolist()
+    assert drive.state.as_present(*decoded(whole)).arrays["counts"]["messages"].tolist() == counts["messages"].tolist()
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_no_other_layout_is_read(layout: str, tmp_path: Path) -> None:
     state = Drive(tmp_path).state
     _, found = decoded(golden(layouts.VERSION - 1))
     with pytest.raises(UnreadableLayoutError, match=f"its layout is {layout}, .*his .*uses {state.layout}"):
-        state.decoded(b"".join(encoded(found, layout)))
+        state.as_present(layout, found)
 
 
 def test_the_first_layout_which_does_not_list_its_columns_is_not_read_any_more() -> None:

@@ -23,7 +23,7 @@ def process(folder: Path, *names: str, engine: RestorableEngine | None = None) -
     )
     bench = IngestBench(engine=engine or RestorableEngine(), sites=sites)
     state = bench.service_state()
-    snapshot, complaints = CheckpointFolder(folder, state.layout, state.decoded).newest()
+    snapshot, complaints = CheckpointFolder(folder, state.layout, state.as_present).newest()
     assert complaints == []
     if snapshot is None:
         bench.guarded_engine.follow_sites()
@@ -34,7 +34,7 @@ def process(folder: Path, *names: str, engine: RestorableEngine | None = None) -
 
 def end(bench: IngestBench, folder: Path) -> None:
     state = bench.service_state()
-    CheckpointFolder(folder, state.layout, state.decoded).write(state.snapshot())
+    CheckpointFolder(folder, state.layout, state.as_present).write(state.snapshot())
 
 
 def send(bench: IngestBench, site: str, range_m: float) -> None:

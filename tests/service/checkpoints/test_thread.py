@@ -40,13 +40,13 @@ class RestorableEngine(TransparentEngine):
 class CheckpointBench:
     """A bench that writes checkpoints to a folder."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, period_s: float = 0.01) -> None:
         self.engine = RestorableEngine()
         self.bench = IngestBench(engine=self.engine, folder=folder)
         self.bench.guarded_engine.follow_sites()
         state = self.bench.service_state()
-        checkpoint_folder = CheckpointFolder(folder / "checkpoints", state.layout, state.decoded)
-        self.checkpoints = CheckpointThread(state, checkpoint_folder, self.bench.metrics, 0.01, self.bench.clock)
+        checkpoint_folder = CheckpointFolder(folder / "checkpoints", state.layout, state.as_present)
+        self.checkpoints = CheckpointThread(state, checkpoint_folder, self.bench.metrics, period_s, self.bench.clock)
         self.thread = IngestThread(
             self.bench.ingest, self.bench.buffer, self.bench.metrics, Period(0.001), self.checkpoints.between_turns
         )
@@ -140,6 +140,29 @@ def test_no_checkpoint_is_written_while_no_message_arrives(running: CheckpointBe
     written = running.count("written")
     look_again(running)
     assert running.count("written") == written
+
+
+def test_the_first_checkpoint_does_not_wait_for_the_period(tmp_path: Path) -> None:
+    bench = CheckpointBench(tmp_path, period_s=3600.0)
+    bench.start()
+    bench.send("a", 4.0)
+    wait_until(lambda: bench.count("written") == 1)
+    bench.stop()
+
+
+def test_the_pause_is_long_while_much_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(checkpointer, "WEAR_BYTES_S", 0.1)
+    bench = CheckpointBench(tmp_path)
+    bench.start()
+    bench.send("a", 4.0)
+    wait_until(lambda: bench.count("written") == 1)
+    bench.send("a", 6.0)
+    wait_until(lambda: bench.bench.x_of("a") == [6.0])
+    wait_until(lambda: bench.checkpoints.age_s > 0.5)
+    assert bench.count("written") == 1
+    assert bench.checkpoints.problem is None
+    bench.stop()
+    assert bench.count("written") == 2
 
 
 def test_a_full_disk_is_reported_and_counted_until_there_is_space_again(

@@ -7,7 +7,7 @@ from uuid import uuid4
 
 import pytest
 
-from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, decoded
+from dropanchor_service.checkpoints.format import CheckpointError, Snapshot
 from dropanchor_service.checkpoints.objects import ObjectFolder
 from dropanchor_service.cluster import checkpoint_objects, leases
 from dropanchor_service.cluster.checkpoint_objects import CheckpointObjects
@@ -40,7 +40,7 @@ def bucket() -> str:
 
 
 def objects(database: Postgresql, bucket: str, folder: ObjectFolder, claim: Claim) -> CheckpointObjects:
-    kept = CheckpointObjects(partial(connect, database.url(), "a"), bucket, folder, "layout", lambda it: decoded(it)[1])
+    kept = CheckpointObjects(partial(connect, database.url(), "a"), bucket, folder, "layout", lambda _, it: it)
     kept.own(claim)
     return kept
 

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, UnreadableLayoutError, decoded
+from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, UnreadableLayoutError
 from dropanchor_service.cli import main
 from dropanchor_service.cluster import leases
 from dropanchor_service.cluster.boot_clock import boot_s
@@ -57,13 +57,12 @@ def snapshot(*numbers: float) -> Snapshot:
 
 
 def row(database: Postgresql, bucket: str, claim: Claim, layout: str = "layout") -> CheckpointRow:
-    def decode(whole: bytes) -> Snapshot:
-        found, content = decoded(whole)
+    def as_present(found: str, content: Snapshot) -> Snapshot:
         if found != layout:
             raise UnreadableLayoutError(f"its layout is {found}, but this version uses {layout}")
         return content
 
-    kept = CheckpointRow(partial(connect, database.url(), "a"), bucket, layout, decode)
+    kept = CheckpointRow(partial(connect, database.url(), "a"), bucket, layout, as_present)
     kept.own(claim)
     return kept
 
@@ -200,7 +199,7 @@ def test_the_command_shows_buckets_and_refuses_what_cannot_be(
     database: Postgresql, capsys: pytest.CaptureFixture[str]
 ) -> None:
     kept = row(database, "shown", claimed(database, "shown"))
-    kept.write(snapshot(*[0.0] * 1000))
+    kept.write(snapshot(*np.random.default_rng(1).normal(size=1000)))
     kept.close()
     assert run(database, "status") == 0
     lines = capsys.readouterr().out.split("shown: ")[1].splitlines()

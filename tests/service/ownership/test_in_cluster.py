@@ -150,7 +150,7 @@ def test_a_standby_takes_over_from_the_version_before_it_with_all_tracks(tmp_pat
         save = "UPDATE dropanchor_checkpoint SET layout = %s, content = %b"
         connection.execute(save, [before, whole], binary=True)
         standby = Standby(reach, "yard", Claimant("new", "", "sites", 0.5), state.layout)
-        row = CheckpointRow(reach, "yard", state.layout, state.decoded)
+        row = CheckpointRow(reach, "yard", state.layout, state.as_present)
         row.own(standby.wait(lambda: None)[0])
         found, complaints = row.newest()
         assert complaints == []

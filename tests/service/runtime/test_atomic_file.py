@@ -32,7 +32,7 @@ def write_site(folder: Path) -> None:
 
 
 def write_checkpoint(folder: Path) -> None:
-    CheckpointFolder(folder, "layout", lambda _: Snapshot()).write(Snapshot())
+    CheckpointFolder(folder, "layout", lambda _, found: found).write(Snapshot())
 
 
 def write_recording(folder: Path) -> None:
