@@ -2,6 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 const { Choice, MOST_SELECTED } = await import("../../../service/dropanchor_service/dashboard/page/choice.js");
+const { STATES, stateNumber } = await import("../../../service/dropanchor_service/dashboard/data/states.js");
 const { listIn, listText } = await import("../../../service/dropanchor_service/dashboard/data/address.js");
 const { joinedCsv, joinedGeojson } = await import("../../../service/dropanchor_service/dashboard/data/joined_tracks.js");
 const { latLonOfSite, siteOfLatLon } = await import("../../../service/dropanchor_service/dashboard/plan/geodesy.js");
@@ -50,6 +51,21 @@ test("the same selection again is no change, and a very large one is cut", () =>
   toggle(choice, "one more");
   assert.equal(choice.tags.length, MOST_SELECTED);
   assert.equal(changes, 1);
+});
+
+test("a state shows only its tags, more states show theirs, too, and without any all tags are shown", () => {
+  const choice = new Choice();
+  const [tracking, degraded, lost] = ["tracking", "degraded", "lost"].map(stateNumber);
+  const shown = (/** @type {number} */ state) => {
+    choice.chooseState(state);
+    return [...STATES.keys()].filter((one) => !choice.hiddenStates.has(one));
+  };
+  assert.deepEqual(shown(lost), [lost]);
+  assert.deepEqual(shown(degraded), [degraded, lost]);
+  assert.deepEqual(shown(lost), [degraded]);
+  assert.deepEqual(shown(degraded), [...STATES.keys()]);
+  assert.ok(!choice.isFiltered);
+  assert.deepEqual(shown(tracking), [tracking]);
 });
 
 test("names with commas, signs and spaces stay whole in the list of the address", () => {

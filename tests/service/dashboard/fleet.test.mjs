@@ -104,7 +104,7 @@ test("tags are filtered by name and state", () => {
   choice.text = " fork ";
   assert.deepEqual([choice.shows(fleet, 0), choice.shows(fleet, 1)], [true, false]);
   choice.text = "";
-  choice.toggleState(stateNumber("tracking"));
+  choice.chooseState(stateNumber("lost"));
   assert.deepEqual([choice.shows(fleet, 0), choice.shows(fleet, 1)], [false, true]);
   choice.showAll();
   assert.ok(choice.shows(fleet, 0) && !choice.isFiltered);

@@ -6,7 +6,7 @@ import { LabelPlaces, placesAround } from "../../../service/dropanchor_service/d
 const FREE = [0, 0, 800, 600];
 
 /** @param {string} key @param {number} x @param {number} y */
-const name = (key, x, y, must = false) => ({ key, x, y, width: 60, must });
+const name = (key, x, y, must = false, trusted = true) => ({ key, x, y, width: 60, must, trusted });
 
 /** @param {number} x @param {number} y */
 const dot = (x, y) => [x - 7, y - 7, x + 7, y + 7];
@@ -41,6 +41,16 @@ test("a name keeps its place although a better one is free again, and moves when
   assert.deepEqual(places.arrange(tag, [best], FREE).get("a"), second);
   assert.deepEqual(places.arrange(tag, [], FREE).get("a"), second);
   assert.notDeepEqual(places.arrange(tag, [second], FREE).get("a"), second);
+});
+
+test("a tag in trouble takes the place of one that is not, whose name was shown", () => {
+  const places = new LabelPlaces();
+  const [fine, troubled] = [name("fine", 100, 100), name("troubled", 104, 100, false, false)];
+  const [only] = placesAround(fine);
+  const around = [[0, 0, 800, only[1] - 4], [0, only[3] + 4, 800, 600], [0, 0, only[0] - 4, 600], [only[2] + 8, 0, 800, 600]];
+  assert.deepEqual([...places.arrange([fine], around, FREE).keys()], ["fine"]);
+  assert.deepEqual([...places.arrange([fine, { ...troubled, trusted: true }], around, FREE).keys()], ["fine"]);
+  assert.deepEqual([...places.arrange([fine, troubled], around, FREE).keys()], ["troubled"]);
 });
 
 test("a name that is shown stays when another tag comes near", () => {

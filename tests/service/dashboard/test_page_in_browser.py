@@ -180,6 +180,7 @@ def test_names_and_states_filter_table_and_map(chromium: Browser, place: Place) 
         page.page.locator(".chip[data-state='lost']").click()
         page.wait_for_map(1)
         page.page.locator("#count", has_text="1 of 3 tags").wait_for()
+        page.page.locator("tr[data-tag='cart-1']").wait_for()
         page.page.locator("#show-all").click()
         page.wait_for_map(3)
 

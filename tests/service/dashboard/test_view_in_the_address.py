@@ -41,7 +41,7 @@ def test_a_copied_link_shows_the_same_tag_map_filter_language_and_units(chromium
         page.page.locator("tr[data-tag='cart-1']").click()
         page.page.locator("#filter").fill("CART")
         page.page.locator("#group").select_option("forklifts")
-        page.page.locator(".chip[data-state='initialising']").click()
+        page.page.locator(".chip[data-state='tracking']").click()
         for _ in range(3):
             page.page.locator("#zoom-in").click()
         page.page.locator("#map").focus()
@@ -56,7 +56,8 @@ def test_a_copied_link_shows_the_same_tag_map_filter_language_and_units(chromium
         expect(page.page.locator("#detail h2")).to_have_text("cart-1")
         expect(page.page.locator("#filter")).to_have_value("cart")
         expect(page.page.locator("#group")).to_have_value("forklifts")
-        expect(page.page.locator(".chip[data-state='initialising']")).to_have_attribute("aria-pressed", "false")
+        expect(page.page.locator(".chip[data-state='tracking']")).to_have_attribute("aria-pressed", "true")
+        expect(page.page.locator(".chip[data-state='lost']")).to_have_attribute("aria-pressed", "false")
         expect(page.page.locator("th.c-x")).to_have_text("x ft")
         page.wait_for("dropanchor.drawing().still")
         assert page.page.evaluate(VIEW) == pytest.approx(view, abs=2)

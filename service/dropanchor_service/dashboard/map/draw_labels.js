@@ -2,7 +2,7 @@
 
 import { ago } from "../data/format.js";
 import { shortened } from "../data/names.js";
-import { AMBIGUOUS } from "../data/states.js";
+import { AMBIGUOUS, STATES } from "../data/states.js";
 import { ANCHOR_PX, SCALE_BAR_PX, anchorLabel, haloText } from "./draw_site.js";
 import { LabelPlaces } from "./label_places.js";
 
@@ -50,7 +50,7 @@ export class Labels {
     const { name, note } = labelOf(fleet, row, now_ms);
     const free = freeBox(view);
     const text = shortened(name, free[2] - free[0] - widthOf(note), widthOf) + note;
-    return { key: fleet.names[row], x, y, width: widthOf(text), must, text };
+    return { key: fleet.names[row], x, y, width: widthOf(text), must, trusted: STATES[fleet.state[row]].trusted, text };
   }
 }
 

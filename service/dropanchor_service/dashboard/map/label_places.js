@@ -1,7 +1,7 @@
 /** Choose where names stand on the map: beside their dots, clear of dots, anchors and each other, and where they stood before. */
 
 /** @typedef {number[]} Box left, top, right, bottom, in pixels */
-/** @typedef {{key: string, x: number, y: number, width: number, must: boolean}} Wanted a name beside (x, y); `must`: with or without room */
+/** @typedef {{key: string, x: number, y: number, width: number, must: boolean, trusted: boolean}} Wanted a name beside (x, y); `must`: with or without room; `trusted`: whether the pose is good */
 
 const HEIGHT_PX = 16;
 const BESIDE_PX = 13;
@@ -22,7 +22,8 @@ export class LabelPlaces {
   /** The place of each name that is shown. @type {Map<string, number>} */
   #shown = new Map();
 
-  /** Return the boxes of the names that have room. Names that must be shown come first, then those that were shown before.
+  /** Return the boxes of the names that have room. Names that must be shown come first, then those of tags in
+   * trouble, and of all these the ones that were shown before.
    * @param {readonly Wanted[]} wanted @param {readonly Box[]} obstacles @param {Box} free the part of the map where names may stand
    * @returns {Map<string, Box>} */
   arrange(wanted, obstacles, free) {
@@ -31,7 +32,7 @@ export class LabelPlaces {
     this.#shown = new Map();
     /** @type {Map<string, Box>} */
     const boxes = new Map();
-    const rank = (/** @type {Wanted} */ { key, must }) => (must ? 0 : before.has(key) ? 1 : 2);
+    const rank = (/** @type {Wanted} */ { key, must, trusted }) => (must ? 0 : trusted ? 3 : 1) + (before.has(key) ? 0 : 1);
     for (const one of [...wanted].sort((a, b) => rank(a) - rank(b))) {
       if (boxes.size >= MOST_NAMES) break;
       const box = this.#place(one, before.get(one.key), taken, free);

@@ -87,9 +87,11 @@ export class Choice extends EventTarget {
     this.#changed();
   }
 
-  /** @param {number} state */
-  toggleState(state) {
+  /** Show only the tags in a state; these, too, where only some are shown; without them, if they were. @param {number} state */
+  chooseState(state) {
+    if (this.hiddenStates.size === 0) this.hiddenStates = new Set(STATES.keys());
     if (!this.hiddenStates.delete(state)) this.hiddenStates.add(state);
+    if (this.hiddenStates.size === STATES.length) this.hiddenStates.clear();
     this.#changed();
   }
 

@@ -38,8 +38,8 @@ export class StateChips {
     const button = document.createElement("button");
     const { count } = chip(button, state);
     button.type = "button";
-    button.title = t("state.toggle", { meaning: state.meaning });
-    button.addEventListener("click", () => this.choice.toggleState(number));
+    button.title = t("state.choose", { meaning: state.meaning });
+    button.addEventListener("click", () => this.choice.chooseState(number));
     return { button, count };
   }
 }

@@ -17,7 +17,7 @@ export default {
   "state.relative.meaning": "Geortet, aber um einen unbekannten Winkel um den Anker gedreht: Das Tag ist nicht dort, wo der Punkt ist.",
   "state.outdated": "Veraltet",
   "state.outdated.meaning": "Keine Verbindung zum Dienst: Das ist die letzte Pose, die ankam.",
-  "state.toggle": "{meaning} Klicken blendet diese Tags aus oder ein.",
+  "state.choose": "{meaning} Klicken zeigt nur diese Tags, noch ein Klick wieder alle.",
   "tags.title": "Tags",
   "tags.filter": "Tags filtern",
   "tags.filter_label": "Tags nach Namen filtern",

@@ -17,7 +17,7 @@ export default {
   "state.relative.meaning": "Tracked, but turned about the anchor by an unknown angle: the dot is not where the tag is.",
   "state.outdated": "Out of date",
   "state.outdated.meaning": "No connection to the service: this is the last pose that arrived.",
-  "state.toggle": "{meaning} Click to hide or show these tags.",
+  "state.choose": "{meaning} Click to show only these tags, and again to show all.",
   "tags.title": "Tags",
   "tags.filter": "Filter tags",
   "tags.filter_label": "Filter tags by name",
