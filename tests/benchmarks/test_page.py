@@ -102,7 +102,7 @@ def circles(tags: int, second: float, t_ns: int) -> Array:
 def live(chromium: Browser, place: Place, tags: int) -> Frames:
     names = [f"tag-{number}" for number in range(tags)]
     begun_s = time.monotonic()
-    with watched_page(chromium, place.url) as page:
+    with watched_page(chromium, place.url, reduced_motion="no-preference") as page:
 
         def move() -> None:
             made = circles(tags, time.monotonic() - begun_s, 0)
@@ -119,7 +119,7 @@ def replayed(chromium: Browser, place: Place, end_ns: int, tags: int, speed: int
     start_ns = end_ns - PAST_S * SECOND
     values = {"from": iso(start_ns), "to": iso(end_ns), "at": iso(start_ns + FIRST_S * SECOND), "speed": str(speed)}
     link = f"{place.url}#" + "&".join(f"{name}={value}" for name, value in values.items())
-    with watched_page(chromium, link) as page:
+    with watched_page(chromium, link, reduced_motion="no-preference") as page:
         page.wait_for(f"dropanchor.past() && !dropanchor.past().loading && dropanchor.tags().length === {tags}", 90)
         page.page.locator("[data-part='play']").click()
         page.page.wait_for_timeout(1000)

@@ -37,7 +37,7 @@ def test_the_tasks_of_an_operator_at_three_sizes_with_few_and_many_tags(tmp_path
 def walk(chromium: Browser, place: WalkPlace, size: tuple[int, int], works: set[str]) -> dict[str, str]:
     """Do every task on a page of this size, and return what each took."""
     found = {}
-    with watched_page(chromium, f"{place.url}?lang=de", size=size, locale="de-DE", reduced_motion="reduce") as page:
+    with watched_page(chromium, f"{place.url}?lang=de", size=size, locale="de-DE") as page:
         for task, ways in Tasks(place, f"{size[0]}").all().items():
             found[task] = walked(page.page, ways, lambda: begin(page, place), works)
             print(f"{len(place.labels)} tags, {size[0]} px, {task}: {found[task]}", flush=True)

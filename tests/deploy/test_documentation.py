@@ -59,7 +59,7 @@ def test_the_site_has_every_page(site: Path) -> None:
 
 @pytest.mark.browser
 def test_the_site_is_searched_without_another_server(address: str) -> None:
-    with running_chromium() as browser, open_page(browser, f"{address}/tutorial.html", reduced_motion="reduce") as page:
+    with running_chromium() as browser, open_page(browser, f"{address}/tutorial.html") as page:
         expect(page.page.locator(".md-nav--primary")).to_contain_text("How-to guides")
         page.page.get_by_role("textbox", name="Search").press_sequentially("floor plan")  # it listens to keys
         found = page.page.locator(".md-search-result__link", has_text="Show a floor plan").first

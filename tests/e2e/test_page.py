@@ -62,7 +62,7 @@ def test_dots_move_in_light_and_dark_and_all_requests_go_to_the_service(chromium
     config.write_text(CONFIG)
     with ExitStack() as stack:
         url = stack.enter_context(running_service("--config", str(config), endpoint=endpoint)).url
-        page = stack.enter_context(watched_page(chromium, url))
+        page = stack.enter_context(watched_page(chromium, url, reduced_motion="no-preference"))
         stack.enter_context(driving_tag("cart", endpoint))
         stack.enter_context(driving_tag("stray", endpoint))
         cart = page.page.locator("tr[data-tag='cart']")

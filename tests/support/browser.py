@@ -146,7 +146,7 @@ def watched_page(
     url: str,
     scheme: Scheme = "light",
     size: tuple[int, int] = (1280, 800),
-    reduced_motion: Literal["reduce", "no-preference"] = "no-preference",
+    reduced_motion: Literal["reduce", "no-preference"] = "reduce",
     locale: str = "en-GB",
     prepare: Callable[[Page], object] = lambda _: None,
 ) -> Iterator[WatchedPage]:
@@ -162,11 +162,15 @@ def open_page(
     url: str,
     scheme: Scheme = "light",
     size: tuple[int, int] = (1280, 800),
-    reduced_motion: Literal["reduce", "no-preference"] = "no-preference",
+    reduced_motion: Literal["reduce", "no-preference"] = "reduce",
     locale: str = "en-GB",
     prepare: Callable[[Page], object] = lambda _: None,
 ) -> Iterator[WatchedPage]:
-    """Open the page, and close it at the end. size: CSS pixels. prepare: is called before the page loads."""
+    """Open the page, and close it at the end.
+
+    size: CSS pixels. reduced_motion: with motion, the map draws tens of times before it is still. prepare: is called
+    before the page loads.
+    """
     context = browser.new_context(
         viewport={"width": size[0], "height": size[1]},
         color_scheme=scheme,

@@ -144,7 +144,7 @@ class TagPage:
 @contextmanager
 def tag_page(browser: Browser, url: str, *scripts: str, **options: Any) -> Iterator[TagPage]:
     """Open the page on a phone's screen. scripts: run in it before its own."""
-    context = browser.new_context(viewport={"width": PHONE[0], "height": PHONE[1]}, **options)
+    context = browser.new_context(viewport={"width": PHONE[0], "height": PHONE[1]}, reduced_motion="reduce", **options)
     for script in (SENSORS, *scripts):
         context.add_init_script(f"{{ {script} }}")
     context.set_default_timeout(1000 * PATIENCE_S)

@@ -27,7 +27,7 @@ def assert_no_violation(page: WatchedPage, axe: str) -> None:
 
 
 def test_no_violation_without_a_tag(chromium: Browser, place: Place, axe: str) -> None:
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         page.page.locator("#empty").wait_for(state="visible")
         assert_no_violation(page, axe)
 
@@ -35,7 +35,7 @@ def test_no_violation_without_a_tag(chromium: Browser, place: Place, axe: str) -
 def test_no_violation_with_tags_in_every_state_fresh_and_old_listed_hidden_and_selected(
     chromium: Browser, place: Place, axe: str
 ) -> None:
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         show_every_state(place)
         page.page.locator("tr[data-tag='lost']").wait_for()
         assert_no_violation(page, axe)
@@ -53,7 +53,7 @@ def test_no_violation_after_the_connection_is_lost(chromium: Browser, axe: str) 
     with ExitStack() as pages:
         with running_server(bench.app(DASHBOARD), bench.stopping) as port:
             place = Place(bench, f"http://127.0.0.1:{port}/")
-            page = pages.enter_context(watched_page(chromium, place.url, reduced_motion="reduce"))
+            page = pages.enter_context(watched_page(chromium, place.url))
             show_every_state(place)
             page.page.locator("tr[data-tag='tracking']").click()
         page.page.locator("#lost").wait_for(state="visible")

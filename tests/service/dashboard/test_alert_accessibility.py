@@ -34,7 +34,7 @@ def test_no_violation_in_the_lists_and_the_forms(chromium: Browser, axe: str) ->
     place = busy_place()
     with (
         served(place),
-        watched_page(chromium, place.url, reduced_motion="reduce") as page,
+        watched_page(chromium, place.url) as page,
     ):
 
         def check(view: str) -> None:

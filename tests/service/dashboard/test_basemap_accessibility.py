@@ -20,7 +20,7 @@ def test_no_violation_while_a_base_map_is_shown_and_hidden(chromium: Browser, ax
     path = basemap_file(tmp_path / "map.pmtiles", {tile: vector_tile({"roads": roads})}, TileType.MVT)
     with (
         basemap_place(path) as place,
-        watched_page(chromium, f"{place.url}?lang=de", reduced_motion="reduce") as page,
+        watched_page(chromium, f"{place.url}?lang=de") as page,
     ):
         place.move("cart", x=20.0, y=10.0)
         page.wait_for("dropanchor.basemap().tiles > 0 && dropanchor.tags().length === 1")

@@ -91,7 +91,7 @@ def test_images_lie_right_behind_a_turned_site_at_every_zoom_and_can_be_hidden(
     del tiles[HOLE]
     with (
         basemap_place(basemap_file(tmp_path / "map.pmtiles", tiles)) as place,
-        watched_page(chromium, place.url, reduced_motion="reduce") as page,
+        watched_page(chromium, place.url) as page,
     ):
         _check_every_zoom(page)
         _check_the_switch(page, place, chromium)
@@ -126,7 +126,6 @@ def _check_the_switch(page: WatchedPage, place: Place, chromium: Browser) -> Non
     with watched_page(
         chromium,
         page.page.url,
-        reduced_motion="reduce",
         prepare=lambda old: old.add_init_script("delete globalThis.OffscreenCanvas"),  # it paints in the page then
     ) as copied:
         copied.wait_for("dropanchor.anchors().length === 2 && dropanchor.drawing().still")
@@ -150,7 +149,7 @@ def test_a_road_of_a_vector_tile_lies_right_in_light_and_dark(chromium: Browser,
     path = basemap_file(tmp_path / "map.pmtiles", {tile: content}, TileType.MVT, Compression.GZIP)
     with (
         basemap_place(path, "Yard plan <b>2026</b>") as place,
-        watched_page(chromium, place.url, reduced_motion="reduce") as page,
+        watched_page(chromium, place.url) as page,
     ):
         assert wait_for_basemap(page) == 15
         expect(page.page.locator("#attribution")).to_have_text("Yard plan 2026")

@@ -34,7 +34,7 @@ def test_names_and_ellipses_of_a_crowd_have_room_and_tags_beside_the_map_are_cou
     place.move(*names, x=x, y=y)
     place.move("rough", x=0.0, y=5.0, cov=np.diag([400.0, 1.0, 0.001]))
     place.move("turned", x=1.0, y=1.0, frame=Frame.RELATIVE)
-    with watched_page(chromium, place.url, reduced_motion="reduce", size=(1440, 900), locale="de-DE") as page:
+    with watched_page(chromium, place.url, size=(1440, 900), locale="de-DE") as page:
         page.wait_for_map(len(x) + 2)
         left, right = (page.page.evaluate(f"dropanchor.screen({edge}, 5)[0]") for edge in (-WIDE_M, WIDE_M))
         assert left > 0

@@ -87,7 +87,7 @@ def test_every_mark_of_the_legend_stands_before_its_word(chromium: Browser, plac
 
 
 def test_the_plots_show_every_measurement_where_it_belongs(chromium: Browser, place: Place) -> None:
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         innovations = drive(place)
         select(page)
         used = innovations[innovations["fused"]]
@@ -104,7 +104,7 @@ def test_the_plots_show_every_measurement_where_it_belongs(chromium: Browser, pl
 
 
 def test_the_minimum_speed_from_the_ranges_is_shown_beside_the_estimate(chromium: Browser, place: Place) -> None:
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         drive(place)
         select(page)
         text = page.page.locator("[data-text='speed']").inner_text()
@@ -121,7 +121,7 @@ def test_the_minimum_speed_from_the_ranges_is_shown_beside_the_estimate(chromium
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_map_shows_the_uncertainty_of_the_heading(chromium: Browser, place: Place, scheme: Scheme) -> None:
-    with watched_page(chromium, place.url, scheme, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url, scheme) as page:
         drive(place)
         page.wait_for_map(1)
         empty = sector(page, 0.0), sector(page, 2.5 * HEADING_SIGMA)
@@ -138,7 +138,7 @@ def sector(page: WatchedPage, off_rad: float) -> tuple[int, ...]:
 
 
 def test_the_innovations_of_an_engine_with_a_hard_gate_are_shown_too(chromium: Browser, place: Place) -> None:
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         drive(place, hard_gate=True)
         select(page)
         assert len(marks(page, "range", "refused")) == len(REFUSED)
@@ -184,7 +184,7 @@ def test_used_samples_are_counted_by_kind_and_rejected_ones_by_reason(chromium: 
 
 def test_the_panel_can_be_focused_and_scrolled_with_the_keyboard(chromium: Browser, place: Place) -> None:
     drive(place)
-    with watched_page(chromium, place.url, size=(1280, 600), reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url, size=(1280, 600)) as page:
         select(page)
         page.page.locator("#detail").focus()
         page.page.keyboard.press("End")
@@ -194,7 +194,7 @@ def test_the_panel_can_be_focused_and_scrolled_with_the_keyboard(chromium: Brows
 
 
 def test_the_panel_names_what_the_ellipse_comes_from_and_what_would_shrink_it(chromium: Browser, place: Place) -> None:
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         drive(place, parts=(0.2, 0.05, 0.0, 0.07, 0.04, 0.0))
         select(page)
         box = page.page.locator("[data-part='uncertainty']")
@@ -218,7 +218,7 @@ def test_north_that_others_know_is_applied_with_one_click_and_may_be_undone(chro
     tags, site = place.bench.answers.tags, place.bench.answers.site
     for name in ("a", "b"):
         tags.rows.norths.set(tags.register(name).row, North(-2.4, 0.1))
-    with watched_page(chromium, place.url, reduced_motion="reduce") as watched:
+    with watched_page(chromium, place.url) as watched:
         drive(place, parts=(0.2, 0.05, 0.0, 0.07, 0.04, 0.0))
         tags.rows.count_samples("imu", np.array([tags.register("cart").row]))
         for name in ("a", "b"):  # else their rows appear where the next one is clicked

@@ -52,7 +52,7 @@ def beside(page: WatchedPage, x: float, y: float) -> Position:
 
 def test_enter_selects_the_only_hit_and_arrows_choose_among_several(chromium: Browser, place: Place) -> None:
     put_tags(place)
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         page.wait_for_map(4)
         name, keys = page.page.locator("#detail [data-part='name']"), page.page.keyboard
         keys.press("/")
@@ -87,7 +87,7 @@ def test_several_tags_are_selected_by_mouse_keys_and_rectangle_compared_and_foll
     chromium: Browser, place: Place, axe: str
 ) -> None:
     put_tags(place)
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         page.wait_for_map(4)
         title, map_ = page.page.locator("#several h2"), page.page.locator("#map")
         page.page.locator("tr[data-tag='cart-1']").click()
@@ -181,7 +181,7 @@ def test_a_right_click_and_a_key_offer_what_can_be_done_at_a_place_and_with_a_ta
     place = zone_place()
     with served(place):
         put_tags(place)
-        with watched_page(chromium, f"{place.url}?lang=de", reduced_motion="reduce") as page:
+        with watched_page(chromium, f"{place.url}?lang=de") as page:
             page.wait_for_map(4)
             map_, menu = page.page.locator("#map"), page.page.locator("#menu")
 
@@ -245,7 +245,7 @@ def test_a_long_press_offers_the_same_and_a_key_that_only_reads_no_change(chromi
     app = bench.app(DASHBOARD, authenticator=Authenticator({SOURCE: keys}))
     with running_server(app, bench.stopping) as port:
         put_tags(place := Place(bench, f"http://127.0.0.1:{port}/"))
-        with open_page(chromium, place.url, size=(390, 844), reduced_motion="reduce") as page:
+        with open_page(chromium, place.url, size=(390, 844)) as page:
             page.page.locator("#key").fill(secret)
             page.page.keyboard.press("Enter")
             page.wait_for("window.dropanchor?.status() === 'live'")

@@ -37,7 +37,7 @@ def test_the_guide_of_a_panel_exists(panel: str, file: str, rest: str) -> None:
 
 @pytest.mark.browser
 def test_a_question_mark_leads_to_the_guide_for_what_is_open(chromium: Browser, site: ZonePlace) -> None:
-    with watched_page(chromium, site.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, site.url) as page:
         page.wait_for_map(1)
         guide = page.page.locator("#guide")
         for press, title in (
@@ -72,7 +72,7 @@ def test_the_german_page_says_that_the_guide_is_english(chromium: Browser, site:
 def test_the_documentation_fits_every_screen_and_is_searched_without_a_script(
     chromium: Browser, site: ZonePlace, axe: str
 ) -> None:
-    with open_page(chromium, f"{site.url}help", reduced_motion="reduce") as page:
+    with open_page(chromium, f"{site.url}help") as page:
         page.page.get_by_label("Search the documentation").fill("floor plan")
         page.page.keyboard.press("Enter")
         page.page.locator("main a").first.click()

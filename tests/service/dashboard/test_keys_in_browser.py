@@ -21,7 +21,7 @@ pytestmark = pytest.mark.browser
 @contextmanager
 def opened_keys(chromium: Browser, port: int, key: str) -> Iterator[tuple[WatchedPage, Locator]]:
     """Open the page with a key of an administrator, and its panel of keys."""
-    with open_page(chromium, f"http://127.0.0.1:{port}/", reduced_motion="reduce") as page:
+    with open_page(chromium, f"http://127.0.0.1:{port}/") as page:
         page.page.locator("#key").fill(key)
         page.page.keyboard.press("Enter")
         page.wait_for("window.dropanchor?.status() === 'live'")

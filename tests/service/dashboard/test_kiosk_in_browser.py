@@ -32,7 +32,6 @@ def test_a_wall_has_large_type_and_no_controls_and_stays_on(
         chromium,
         f"{place.url}?kiosk#tag=cart-3",
         size=size,
-        reduced_motion="reduce",
         prepare=lambda page: page.add_init_script(WAKE),
     ) as page:
         expect(page.page.locator("#detail h2")).to_have_text("cart-3")

@@ -190,7 +190,7 @@ def test_a_browser_in_a_language_that_the_page_lacks_gets_english(chromium: Brow
 
 @pytest.mark.parametrize("size", [(1280, 800), (390, 844)], ids=["desktop", "phone"])
 def test_german_texts_fit(chromium: Browser, yard: ZonePlace, size: tuple[int, int]) -> None:
-    with watched_page(chromium, yard.url, locale="de-DE", size=size, reduced_motion="reduce") as page:
+    with watched_page(chromium, yard.url, locale="de-DE", size=size) as page:
         page.page.locator("tr[data-tag='degraded']").click()
         page.wait_for("dropanchor.drawing().still")
         cut = page.page.evaluate(

@@ -118,7 +118,7 @@ def test_show_all_keeps_every_tag_and_label_clear_of_the_edges_and_the_buttons(c
     x, y = zip(*corners, strict=True)
     names = [f"forklift-{i}" for i in range(len(corners))]
     place.move(*names, x=x, y=y)
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         for size in every_size(page):
             place.move(*names, x=x, y=y)
             page.wait_for_map(len(corners))
@@ -138,7 +138,7 @@ def test_show_all_keeps_every_tag_and_label_clear_of_the_edges_and_the_buttons(c
 
 def test_the_label_of_a_selected_tag_at_the_edge_stays_on_the_map(chromium: Browser, place: Place) -> None:
     place.move("a-tag-with-a-long-name-that-is-as-wide-as-a-telephone-is-64-cha", x=0.0, y=1.0)
-    with watched_page(chromium, place.url, size=(390, 844), reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url, size=(390, 844)) as page:
         page.wait_for_map(1)
         page.page.locator("tbody tr:visible").click()
         page.wait_for_map(1)

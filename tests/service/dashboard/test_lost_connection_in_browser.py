@@ -67,7 +67,7 @@ def outage(chromium: Browser) -> Iterator[Outage]:
     with ExitStack() as pages:
         with running_server(bench.app(DASHBOARD), bench.stopping) as port:
             place = Place(bench, f"http://127.0.0.1:{port}/")
-            page = pages.enter_context(watched_page(chromium, place.url, reduced_motion="reduce"))
+            page = pages.enter_context(watched_page(chromium, place.url))
             show_six(place, page)
             page.page.locator("tr[data-tag='cart-0']").click()
             show_six(place, page)
@@ -125,6 +125,6 @@ def test_a_stream_that_nobody_answers_is_asked_for_again(chromium: Browser) -> N
 
     with running_server(bench.app(DASHBOARD), bench.stopping) as port:
         place = Place(bench, f"http://127.0.0.1:{port}/")
-        with watched_page(chromium, place.url, reduced_motion="reduce", prepare=intercept) as page:
+        with watched_page(chromium, place.url, prepare=intercept) as page:
             show_six(place, page)
             assert len(asked) == 2

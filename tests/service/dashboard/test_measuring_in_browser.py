@@ -13,7 +13,7 @@ pytestmark = pytest.mark.browser
 
 def test_clicks_measure_distance_and_bearing_and_select_no_tag(chromium: Browser, place: Place) -> None:
     place.move("west", "north", x=[-10.0, -10.0], y=[0.0, 20.0])
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         page.wait_for_map(2)
         page.page.locator("#measure").click()
         answer = page.page.locator("#measured")

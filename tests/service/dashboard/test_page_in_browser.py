@@ -52,7 +52,7 @@ def test_without_a_tag_the_page_shows_how_to_start_one(chromium: Browser, place:
 
 
 def test_a_pose_is_a_dot_and_a_table_row_and_both_follow_the_tag(chromium: Browser, place: Place) -> None:
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         place.move("cart", x=1.0, y=2.0, speed=0.5, t_ns=time.time_ns() + 60_000_000_000)  # it stays fresh
         line = page.page.locator("tr[data-tag='cart']")
         assert line.inner_text().split()[:4] == ["cart", "Tracking", "1.00", "2.00"]
@@ -71,7 +71,7 @@ def test_only_a_fresh_tracked_pose_is_a_full_dot(chromium: Browser, place: Place
         page.wait_for_map(6)
         return {state.name for state in State if colour_at(page, state.name) == TRACKING_BLUE}
 
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         seen = [full()]
         # On a slow machine the poses may become stale before their colours are read.
         while not seen[-1] and len(seen) < 20:
@@ -80,7 +80,7 @@ def test_only_a_fresh_tracked_pose_is_a_full_dot(chromium: Browser, place: Place
 
 
 def test_an_old_pose_is_no_longer_a_full_dot(chromium: Browser, place: Place) -> None:
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         for _ in range(20):
             place.move("cart", x=2.0, y=1.0, heading=np.nan, cov=np.eye(3) * 1e-6)
             page.wait_for_map(1)
@@ -95,7 +95,7 @@ def test_an_old_pose_is_no_longer_a_full_dot(chromium: Browser, place: Place) ->
 
 def test_an_ambiguous_tag_is_shown_at_all_its_possible_positions(chromium: Browser, place: Place) -> None:
     ambiguous(place, "cart", (0.6, 3.0, 4.0), (0.4, 3.0, -4.0))
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         page.page.locator("tr[data-tag='cart']").click()
         page.page.locator("#detail li").first.wait_for()
         texts = page.page.locator("#detail li").all_inner_texts()
@@ -132,7 +132,7 @@ def test_selection_works_with_the_keyboard_alone(chromium: Browser, place: Place
 
 def test_a_click_on_a_dot_selects_it_and_a_click_beside_it_deselects_it(chromium: Browser, place: Place) -> None:
     place.move("cart", x=2.0, y=1.0)
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         page.wait_for_map(1)
         x, y = page.tags()["cart"]["pixel"]
         page.page.locator("#map").click(position={"x": x, "y": y})
@@ -143,7 +143,7 @@ def test_a_click_on_a_dot_selects_it_and_a_click_beside_it_deselects_it(chromium
 
 def test_the_map_moves_by_mouse_and_keys_and_returns_with_show_all(chromium: Browser, place: Place) -> None:
     place.move("cart", x=2.0, y=1.0)
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         page.wait_for_map(1)
         page.page.locator("#fit").click()  # the map may have fitted the anchor alone, if that arrived first
         page.wait_for_map(1)

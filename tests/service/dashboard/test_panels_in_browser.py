@@ -64,7 +64,7 @@ def site() -> Iterator[ZonePlace]:
 def test_every_panel_opens_from_every_other_and_asks_only_when_something_typed_would_be_lost(
     chromium: Browser, site: ZonePlace
 ) -> None:
-    with watched_page(chromium, site.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, site.url) as page:
         page.wait_for_map(1)
         expect(page.page.locator("#edit-plans")).to_be_visible()
         page.wait_for("dropanchor.events() && dropanchor.destinations().length === 1")

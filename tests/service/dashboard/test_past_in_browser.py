@@ -135,7 +135,7 @@ def test_the_keyboard_plays_and_moves_the_clock(chromium: Browser, past: tuple[P
 
 def test_the_map_follows_a_tag_through_the_past(chromium: Browser, past: tuple[Place, int]) -> None:
     place, end_ns = past
-    with watched_page(chromium, link_to(place, end_ns, 0, speed="20", tag="first"), reduced_motion="reduce") as page:
+    with watched_page(chromium, link_to(place, end_ns, 0, speed="20", tag="first")) as page:
         wait_for_past(page, 3)
         asked = "performance.getEntriesByType('resource').some(({ name }) => /max_points=5000&tags=first/.test(name))"
         page.wait_for(asked)  # for the line of the chosen tag
@@ -286,7 +286,7 @@ def test_the_trail_of_a_tag_begins_before_the_page_was_opened(chromium: Browser,
         for second in range(20):
             place.move("a", x=float(second - 19), y=2.0, speed=1.0, t_ns=now_ns - (19 - second) * SECOND)
         place.bench.write_history()
-        with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+        with watched_page(chromium, place.url) as page:
             page.wait_for("dropanchor.trail('a').length >= 18")
             xs = [x for x in page.page.evaluate("dropanchor.trail('a')") if x is not None]
             assert xs == sorted(xs)
@@ -295,7 +295,7 @@ def test_the_trail_of_a_tag_begins_before_the_page_was_opened(chromium: Browser,
 
 def test_a_heat_map_shows_where_tags_were_and_how_much_is_left_out(chromium: Browser, past: tuple[Place, int]) -> None:
     place, end_ns = past
-    with watched_page(chromium, link_to(place, end_ns, 299), reduced_motion="reduce") as page:
+    with watched_page(chromium, link_to(place, end_ns, 299)) as page:
         wait_for_past(page, 3)
         page.wait_for("dropanchor.drawing().still")
         button, legend = page.page.locator("[data-part='heat']"), page.page.locator("#heat")
@@ -323,7 +323,7 @@ def test_a_heat_map_shows_where_tags_were_and_how_much_is_left_out(chromium: Bro
 def test_the_past_is_accessible_and_nothing_is_cut_off(chromium: Browser, past: tuple[Place, int], axe: str) -> None:
     place, end_ns = past
     link = link_to(place, end_ns, 155, tag="second", heat="1")
-    with watched_page(chromium, link, reduced_motion="reduce") as page:
+    with watched_page(chromium, link) as page:
         wait_for_past(page, 3)
         expect(page.page.locator("#heat [data-part='note']")).to_contain_text("Most:")
         assert violations(page.page, axe) == []

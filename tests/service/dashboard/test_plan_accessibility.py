@@ -38,7 +38,7 @@ def hall(place: PlanPlace) -> None:
 def test_no_violation_while_plans_are_shown_uploaded_and_aligned(chromium: Browser, axe: str) -> None:
     with plan_place() as place:
         hall(place)
-        with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+        with watched_page(chromium, place.url) as page:
 
             def check(view: str) -> None:
                 assert violations(page.page, axe) == [], view

@@ -191,7 +191,7 @@ def test_the_map_shows_the_pixels_of_the_plan_in_light_and_inverted_in_dark(
     chromium: Browser, place: PlanPlace
 ) -> None:
     place.put("hall", image_file(WIDTH, HEIGHT), opacity=1.0)
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         edit(page, open_panel(page), "hall")
         page.wait_for("dropanchor.plans()[0].isReady && dropanchor.drawing().still")
         (x0, y0), (x1, _), *_ = page.page.evaluate("dropanchor.draft().corners")

@@ -90,7 +90,7 @@ def drag(page: WatchedPage, bar: Locator, up_px: float) -> None:
 def test_six_rows_and_the_buttons_that_save_stay_in_view_and_the_bars_remember_where_they_are(
     chromium: Browser, site: ZonePlace
 ) -> None:
-    with watched_page(chromium, site.url, size=(1440, 900), reduced_motion="reduce") as page:
+    with watched_page(chromium, site.url, size=(1440, 900)) as page:
         page.wait_for_map(6)
         tag, detail = page.page.locator("tr[data-tag='cart-3']"), page.page.locator("#detail")
         tag.click()
@@ -135,7 +135,7 @@ def test_six_rows_and_the_buttons_that_save_stay_in_view_and_the_bars_remember_w
 def test_on_a_phone_the_list_comes_first_in_a_sheet_and_one_button_stands_for_the_tools(
     chromium: Browser, site: ZonePlace, axe: str
 ) -> None:
-    with watched_page(chromium, site.url, size=(390, 844), reduced_motion="reduce") as page:
+    with watched_page(chromium, site.url, size=(390, 844)) as page:
         page.wait_for_map(6)
         aside, sheet = page.page.locator("aside"), page.page.get_by_role("separator", name="Height of the list")
         assert page.page.evaluate(ROWS) >= 4

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.browser
 def test_no_violation_while_a_site_is_set_up(chromium: Browser, place: Place, axe: str) -> None:
     place.bench.answers.site.set_tag("cart", TagSettings(name="Forklift 1", group="forklifts", colour="#d97a0a"))
     place.move("cart", x=1.0, y=1.0)
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         page.page.get_by_role("button", name="Set up anchors").click()
         with page.page.expect_response(lambda response: "/anchors/17" in response.url):
             page.page.get_by_role("button", name="17: ").click()

@@ -246,11 +246,11 @@ def test_after_stop_nothing_more_is_taken_and_the_rest_is_sent(chromium: Browser
 def test_the_page_has_no_accessibility_violation(chromium: Browser, service: Service, axe: str) -> None:
     with ExitStack() as opened:
         with service.running():
-            with tag_page(chromium, f"http://127.0.0.1:{service.port}/tag", reduced_motion="reduce") as page:
+            with tag_page(chromium, f"http://127.0.0.1:{service.port}/tag") as page:
                 page.page.locator("#form").wait_for(state="visible")
                 assert violations(page.page, axe) == []
             service.bench.move("anna", t_ns=time.time_ns())
-            page = opened.enter_context(tag_page(chromium, service.link, SERIAL, reduced_motion="reduce"))
+            page = opened.enter_context(tag_page(chromium, service.link, SERIAL))
             page.page.locator("#live").wait_for(state="visible")
             assert violations(page.page, axe) == []
             page.start()

@@ -34,8 +34,8 @@ def test_a_name_a_colour_and_a_group_show_on_the_list_and_the_map_of_every_page(
 ) -> None:
     place.move("cart", "van", x=[1.0, 3.0], y=1.0, heading=math.nan)
     with (
-        watched_page(chromium, place.url, reduced_motion="reduce") as page,
-        watched_page(chromium, place.url, reduced_motion="reduce") as other,
+        watched_page(chromium, place.url) as page,
+        watched_page(chromium, place.url) as other,
     ):
         form = open_settings(page, "cart")
         form.get_by_label("Name").fill("Forklift 1")
@@ -128,7 +128,7 @@ def test_settings_that_another_page_changed_meanwhile_are_merged_only_when_asked
 
 def test_the_tag_is_here_sets_its_start_by_a_drag_or_by_numbers(chromium: Browser, place: Place) -> None:
     place.move("cart", x=1.0, y=1.0, heading=0.0)
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         page.wait_for_map(1)
         open_settings(page, "cart")
         page.page.get_by_role("button", name="The tag is here…").click()

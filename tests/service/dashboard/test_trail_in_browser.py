@@ -83,7 +83,7 @@ def test_what_was_set_here_is_given_back_to_the_settings_file(chromium: Browser,
     yard.store.set_anchor(Anchor(id="3"))
     yard.store.remove_anchor("2")
     yard.store.set_tag("cart", TagSettings(height_m=1.5))
-    with yard.served() as url, open_page(chromium, url, reduced_motion="reduce") as page:
+    with yard.served() as url, open_page(chromium, url) as page:
         dialog = opened(page, yard.secrets["admin"])
         values = dialog.get_by_role("list", name="Where values come from")
         expect(values).to_contain_text("site › name: Hof (set here) instead of Yard (yard.toml)")
@@ -114,7 +114,7 @@ def test_a_deleted_tag_of_the_settings_file_is_given_back(chromium: Browser, yar
 
 def test_who_changed_what_is_shown_and_undone_unless_it_was_changed_since(chromium: Browser, yard: Yard) -> None:
     moved = {"id": "1", "x": 50.0}
-    with yard.served() as url, open_page(chromium, url, reduced_motion="reduce") as page:
+    with yard.served() as url, open_page(chromium, url) as page:
         headers = {"authorization": f"Bearer {yard.secrets['write']}"}
         for path, body in (("anchors/1", moved), ("tags/cart/settings", {"name": "Cart"})):
             assert page.page.request.put(f"{url}api/v1/{path}", data=body, headers=headers).ok

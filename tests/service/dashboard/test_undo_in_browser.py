@@ -55,7 +55,7 @@ def corner_of(place: ZonePlace, zone: str) -> list[float]:
 def test_zones_are_undone_step_by_step_while_they_are_drawn_and_after_they_are_saved(
     chromium: Browser, yard: ZonePlace
 ) -> None:
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as watched:
+    with watched_page(chromium, yard.url) as watched:
         page, outcome = watched.page, outcome_of(watched)
         watched.wait_for("dropanchor.events() && 'ramp' in dropanchor.zones()")
         watched.wait_for_map(2)
@@ -141,7 +141,7 @@ def test_rules_destinations_tags_and_anchors_are_undone(chromium: Browser, yard:
     )
     site, destinations, rules = yard.bench.answers.site, yard.parts.destinations, yard.parts.items.rules
     site.set_anchor(Anchor(id="17", x=3.0, y=2.0, z=1.0))
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as watched:
+    with watched_page(chromium, yard.url) as watched:
         page, outcome = watched.page, outcome_of(watched)
         watched.wait_for("dropanchor.events() && 'ramp' in dropanchor.zones()")
         page.locator("#alerts summary").click()

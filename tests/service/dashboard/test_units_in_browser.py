@@ -24,7 +24,7 @@ def test_units_are_chosen_remembered_and_used_everywhere_while_settings_stay_si(
     place.put(disc("dock", 0.0, 0.0, 3.048, name="Dock", speed_mps=2.5))
     place.go("cart", 3.048, -6.096)
     place.move("cart", x=3.048, y=-6.096, speed=2.0, cov=np.diag([0.25, 0.25, 0.001]))
-    with served(place), watched_page(chromium, place.url, reduced_motion="reduce") as watched:
+    with served(place), watched_page(chromium, place.url) as watched:
         page = watched.page
         page.get_by_role("button", name="Display").click()
         page.get_by_label("Lengths").select_option("ft")

@@ -58,7 +58,7 @@ def test_the_markers_of_the_states_differ_in_shape_and_stand_out_without_any_col
     chromium: Browser, place: Place, scheme: Scheme
 ) -> None:
     show_every_state(place)
-    with watched_page(chromium, place.url, scheme=scheme, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url, scheme=scheme) as page:
         page.wait_for_map(len(NAMES))
         tags = page.tags()
         shapes = {tags[name]["state"]: shape_of(page.page, *tags[name]["pixel"]) for name in NAMES}
@@ -84,7 +84,7 @@ def test_the_colours_of_the_states_have_enough_contrast(chromium: Browser, place
 
 def test_nothing_moves_by_itself_with_reduced_motion(chromium: Browser, place: Place) -> None:
     show_every_state(place)
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         page.page.locator("tr[data-tag='tracking']").click()
         page.page.get_by_role("button", name="Display").click()
         assert page.page.evaluate(MOVING) == []
@@ -96,8 +96,13 @@ def test_nothing_moves_by_itself_with_reduced_motion(chromium: Browser, place: P
         drawings = page.page.evaluate("dropanchor.drawing().drawings")
         page.page.wait_for_timeout(200)
         assert page.page.evaluate("dropanchor.drawing().drawings") - drawings <= 5  # it jumped, and glides no more
-    with watched_page(chromium, place.url) as page:
+    with watched_page(chromium, place.url, reduced_motion="no-preference") as page:
         assert page.page.evaluate(MOVING) != []
+        page.wait_for("dropanchor.drawing().still")
+        drawings = page.page.evaluate("dropanchor.drawing().drawings")
+        place.move("tracking", x=8.0, y=3.5)
+        page.wait_for("dropanchor.tags().find(({ tag }) => tag === 'tracking').x === 8 && dropanchor.drawing().still")
+        assert page.page.evaluate("dropanchor.drawing().drawings") - drawings > 5  # it glided, and has arrived
 
 
 def test_a_question_mark_shows_the_keys_and_keys_go_where_one_types(chromium: Browser, place: Place) -> None:
@@ -132,7 +137,7 @@ def test_a_question_mark_shows_the_keys_and_keys_go_where_one_types(chromium: Br
 
 def test_no_violation_in_the_dialogs_and_on_the_wall(chromium: Browser, place: Place, axe: str) -> None:
     show_every_state(place)
-    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url) as page:
         page.page.get_by_role("button", name="Display").click()
         assert violations(page.page, axe) == []
         page.page.get_by_role("button", name="Keyboard").click()

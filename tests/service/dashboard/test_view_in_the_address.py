@@ -37,7 +37,7 @@ def fleet(place: Place) -> Place:
 
 
 def test_a_copied_link_shows_the_same_tag_map_filter_language_and_units(chromium: Browser, fleet: Place) -> None:
-    with watched_page(chromium, f"{fleet.url}?lang=de&length=ft", reduced_motion="reduce") as page:
+    with watched_page(chromium, f"{fleet.url}?lang=de&length=ft") as page:
         page.page.locator("tr[data-tag='cart-1']").click()
         page.page.locator("#filter").fill("CART")
         page.page.locator("#group").select_option("forklifts")
@@ -51,7 +51,7 @@ def test_a_copied_link_shows_the_same_tag_map_filter_language_and_units(chromium
         page.page.get_by_role("button", name="Anzeige").click()
         expect(page.page.locator("#link")).to_have_text(link)
         assert page.errors == []
-    with watched_page(chromium, link, reduced_motion="reduce") as page:
+    with watched_page(chromium, link) as page:
         expect(page.page.locator("#count")).to_have_text("1 von 6 Tags")
         expect(page.page.locator("#detail h2")).to_have_text("cart-1")
         expect(page.page.locator("#filter")).to_have_value("cart")

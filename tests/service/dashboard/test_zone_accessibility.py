@@ -41,7 +41,7 @@ def test_no_violation_in_the_lists_the_editor_and_without_a_connection(chromium:
     place = busy_yard()
     with ExitStack() as pages:
         with served(place):
-            page = pages.enter_context(watched_page(chromium, place.url, reduced_motion="reduce"))
+            page = pages.enter_context(watched_page(chromium, place.url))
 
             def check(view: str) -> None:
                 assert violations(page.page, axe) == [], view

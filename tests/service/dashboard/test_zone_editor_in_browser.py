@@ -49,7 +49,7 @@ def drag(page: WatchedPage, handle: Locator, dx: int, dy: int) -> None:
 
 
 def test_a_polygon_is_drawn_with_clicks_and_watched_at_once(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, yard.url) as page:
         form = open_list(page)
         page.page.get_by_role("button", name="New polygon").click()
         canvas = page.page.locator("#map")
@@ -80,7 +80,7 @@ def test_a_polygon_is_drawn_with_clicks_and_watched_at_once(chromium: Browser, y
 
 
 def test_corners_are_dragged_added_and_removed(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, yard.url) as page:
         form = open_list(page)
         page.page.get_by_role("button", name="Edit Yard").click()
         expect(form.get_by_label("Name")).to_be_focused()
@@ -99,7 +99,7 @@ def test_corners_are_dragged_added_and_removed(chromium: Browser, yard: ZonePlac
 
 
 def test_a_zone_is_made_with_the_keyboard_alone(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, yard.url) as page:
         form = open_list(page)
         page.page.get_by_role("button", name="New polygon").press("Enter")
         expect(form.get_by_label("Name")).to_be_focused()
@@ -119,7 +119,7 @@ def test_a_zone_is_made_with_the_keyboard_alone(chromium: Browser, yard: ZonePla
 
 
 def test_a_circle_is_placed_sized_and_edited(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, yard.url) as page:
         form = open_list(page)
         page.page.get_by_role("button", name="New circle").click()
         page.page.locator("#map").click(position={"x": 300, "y": 500})
@@ -140,7 +140,7 @@ def test_a_circle_is_placed_sized_and_edited(chromium: Browser, yard: ZonePlace)
 def test_another_panel_waits_for_a_save_that_takes_its_time_and_asks_nothing(
     chromium: Browser, yard: ZonePlace
 ) -> None:
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, yard.url) as page:
         form = open_list(page)
         held: list[Route] = []
         page.page.route(
@@ -160,7 +160,7 @@ def test_another_panel_waits_for_a_save_that_takes_its_time_and_asks_nothing(
 
 
 def test_a_polygon_that_crosses_itself_is_refused_in_words_at_its_place(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, yard.url) as page:
         form = open_list(page)
         page.page.get_by_role("button", name="New polygon").click()
         for x, y in ((200, 300), (320, 400), (320, 300), (200, 400)):
@@ -177,7 +177,7 @@ def test_a_polygon_that_crosses_itself_is_refused_in_words_at_its_place(chromium
 
 
 def test_a_change_of_somebody_else_is_not_overwritten(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, yard.url) as page:
         form = open_list(page)
         page.page.get_by_role("button", name="Edit Yard").click()
         expect(form.get_by_label("Name")).to_be_focused()
@@ -195,7 +195,7 @@ def test_a_change_of_somebody_else_is_not_overwritten(chromium: Browser, yard: Z
 
 
 def test_a_new_zone_never_replaces_one_that_somebody_else_has_just_made(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, yard.url) as page:
         form = open_list(page)
         page.page.get_by_role("button", name="New circle").click()
         page.page.locator("#map").click(position={"x": 300, "y": 300})
@@ -211,7 +211,7 @@ def test_a_new_zone_never_replaces_one_that_somebody_else_has_just_made(chromium
 
 
 def test_a_zone_is_deleted_only_after_a_confirmation(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, yard.url) as page:
         form = open_list(page)
         page.page.get_by_role("button", name="Edit Yard").click()
         form.get_by_role("button", name="Delete…").click()

@@ -39,7 +39,7 @@ def strokes(page: WatchedPage) -> int:
 
 
 def test_a_zone_is_dashed_until_a_tag_enters_and_its_list_counts_the_tags(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, yard.url) as page:
         page.wait_for("dropanchor.events() && dropanchor.zones().yard === 0")
         page.page.locator("#zone-list summary").click()
         line = page.page.locator("#zone-list li", has_text="Yard")
@@ -58,7 +58,7 @@ def test_a_zone_is_dashed_until_a_tag_enters_and_its_list_counts_the_tags(chromi
 
 def test_the_lists_of_the_present_are_hidden_while_the_page_shows_the_past(chromium: Browser, yard: ZonePlace) -> None:
     yard.go("cart-3", 3.0, 3.0)
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, yard.url) as page:
         page.wait_for("dropanchor.events() && dropanchor.zones().yard === 1")
         lists = [page.page.locator("#events"), page.page.locator("#zone-list")]
         lists[1].locator("summary").click()
@@ -80,7 +80,7 @@ def test_the_lists_of_the_present_are_hidden_while_the_page_shows_the_past(chrom
 
 def test_events_come_live_and_newest_first_and_a_click_selects_tag_and_zone(chromium: Browser, yard: ZonePlace) -> None:
     yard.go("cart-3", 3.0, 3.0)
-    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+    with watched_page(chromium, yard.url) as page:
         page.wait_for("dropanchor.events()")
         events = page.page.locator("#events")
         expect(events.locator("summary")).to_contain_text("cart-3 entered Yard")
@@ -105,7 +105,7 @@ def test_nothing_is_counted_while_the_connection_is_lost_and_missed_events_come_
     place.go("cart-3", 3.0, 3.0)
     with ExitStack() as pages:
         with served(place) as port:
-            page = pages.enter_context(watched_page(chromium, place.url, reduced_motion="reduce"))
+            page = pages.enter_context(watched_page(chromium, place.url))
             page.wait_for("dropanchor.events() && dropanchor.zones().yard === 1")
             page.page.locator("#zone-list summary").click()
         page.page.locator("#lost").wait_for(state="visible")
