@@ -7,8 +7,10 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 TOOLS := $(VENV)/tools
 COMPILED := $(VENV)/compiled
+COLLECTED := $(VENV)/collected
 KERNELS := $(shell find service/dropanchor_service/estimation service/dropanchor_service/zones service/dropanchor_service/*/kernels -name '*.py')
-INSTALL := install --quiet --constraint constraints.txt
+# Of the thousands of modules Python compiles itself what it imports; pip would compile them all, for half of its time.
+INSTALL := install --quiet --no-compile --constraint constraints.txt
 DISTRIBUTIONS := -e schemas -e 'tag_client[calibrate,mqtt,serial]' -e service/evaluation -e 'service[cluster,evaluation,foxglove,maps,mqtt,parquet,postgresql,ros2,s3]'
 TOOLS_TOO := --group dev -e 'tag_client[imu]' -e 'service[recordings]'
 FAILED := echo 'The installation failed; the lines above say why. Mend that, then run the same make command again.' >&2; exit 1
@@ -20,7 +22,7 @@ FAST_TESTS := -n 3 --dist worksteal -m 'not benchmark and not cluster and not in
 
 RESULTS := service/docs/results
 
-.PHONY: help demo docs pythons would-install test test-cluster check bench results pictures install kernels chromium mosquitto proxies postgresql clean
+.PHONY: help demo docs pythons system-python would-install test test-cluster check bench results pictures install kernels chromium mosquitto proxies postgresql clean
 .DEFAULT_GOAL := help
 
 # The same as in tests/conftest.py, from the first import on.
@@ -65,19 +67,27 @@ $(COMPILED): $(STAMP) $(KERNELS)
 demo: install
 	@exec $(BIN)/dropanchor demo $(DEMO)
 
-# That the pins hold for the Pythons that are promised: .ci/pythons.
+# That the pins hold for the Pythons that are promised, and that the system's own installs what a user installs.
 would-install: $(STAMP)
 	@$(BIN)/python -m pip --python $(PYTHON) $(INSTALL) --dry-run $(DISTRIBUTIONS) $(TOOLS_TOO)
 
 pythons: $(STAMP)
 	@.ci/pythons
 
+system-python:
+	@.ci/system-python
+
 docs: $(TOOLS)
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --config-file service/mkdocs.yml
 	@echo 'The pages are in build/docs: $(BIN)/python -m http.server --bind 127.0.0.1 --directory build/docs'
 
-kernels: $(TOOLS)
+# They need no tools, which .ci/run installs meanwhile.
+kernels: $(STAMP)
 	@PYTHONPATH=tests $(BIN)/python -m support.kernel_cache
+
+# Without this each worker compiles all test modules, and several compile the same at a time.
+$(COLLECTED): $(TOOLS)
+	@if $(BIN)/python -m pytest --collect-only -q >/dev/null; then touch $@; fi
 
 chromium:
 	@command -v chromium-headless-shell >/dev/null || { \
@@ -111,7 +121,7 @@ postgresql:
 		apt-get update -qq && apt-get install -y -qq postgresql >/dev/null; } || \
 		echo 'The tests with a database need the package postgresql: without it they are skipped.' >&2
 
-test: $(TOOLS) $(if $(FAST),,chromium mosquitto proxies postgresql kernels)
+test: $(TOOLS) $(if $(FAST),,chromium mosquitto proxies postgresql kernels $(COLLECTED))
 	@echo '== running $(if $(FAST),the fast,all) tests'
 	@$(BIN)/python -m pytest $(if $(FAST),$(FAST_TESTS),$(PARALLEL)) $(PYTEST)
 

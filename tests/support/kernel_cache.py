@@ -59,17 +59,12 @@ def _mark(what: str) -> Path:
 
 
 def prepare() -> None:
-    """Compile the kernels and the tests, unless that was done with these sources.
-
-    Without this each worker compiles both, and several compile the same at a time.
-    """
+    """Compile the kernels, unless that was done with these sources. Without this each worker compiles them."""
     if (mark := _mark("prepared")).exists():
         return
-    sys.stdout.write("== compiling the estimators and the tests, for minutes (once after a change of the estimators)\n")
+    sys.stdout.write("== compiling the estimators, for minutes (once after a change of them)\n")
     compile_with_smoothers()
-    collect = [sys.executable, "-m", "pytest", "--collect-only", "-q"]
-    if subprocess.run(collect, stdout=subprocess.DEVNULL, check=False).returncode == 0:
-        mark.touch()
+    mark.touch()
 
 
 def compile_with_smoothers() -> None:

@@ -23,7 +23,7 @@ _log = logging.getLogger(__name__)
 
 def address_of_this_machine() -> str:
     """Return the address that other machines probably reach."""
-    return str(get_node_ip_address())  # type: ignore[no-untyped-call]
+    return str(get_node_ip_address())
 
 
 class _Alive(NamedTuple):
@@ -51,7 +51,7 @@ class OnRay:
     def nodes(self) -> list[Node]:
         """Return the nodes that are alive and carry shards. Of two with one name, the first counts."""
         found: dict[str, _Alive] = {}
-        rows: list[dict[str, Any]] = ray.nodes()  # type: ignore[no-untyped-call]
+        rows: list[dict[str, Any]] = ray.nodes()
         for row in rows:
             name, shards = row["NodeName"], int(row["Resources"].get(RESOURCE, 0))
             if row["Alive"] and shards:
