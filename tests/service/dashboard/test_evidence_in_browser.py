@@ -71,9 +71,15 @@ def marks(page: WatchedPage, plot: str, name: str) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in re.findall(r"[ML](-?[\d.]+) (-?[\d.]+)", d)]
 
 
-def test_every_mark_of_the_legend_stands_before_its_word(chromium: Browser, place: Place) -> None:
+def test_what_is_known_of_the_samples_of_a_tag_is_shown_where_it_belongs(chromium: Browser, place: Place) -> None:
+    innovations = drive(place)
+    tags = place.bench.answers.tags
+    row = tags.register("cart").row
+    tags.rows.count_samples("range", np.full(1204, row))
+    tags.rows.count_samples("imu", np.full(12040, row))
+    tags.rows.count_rejected(Reason.LATE, np.full(3, row))
+    tags.rows.count_rejected(Reason.RANGE_ABSURD, np.full(1, row))
     with watched_page(chromium, place.url) as page:
-        drive(place)
         select(page)
         legend = page.page.locator(".legend").filter(has=page.page.locator("i.measured"))
         legend.scroll_into_view_if_needed()
@@ -85,11 +91,6 @@ def test_every_mark_of_the_legend_stands_before_its_word(chromium: Browser, plac
             assert around["x"] <= box["x"] < around["x"] + around["width"]
             assert around["y"] <= box["y"] < around["y"] + around["height"]
 
-
-def test_the_plots_show_every_measurement_where_it_belongs(chromium: Browser, place: Place) -> None:
-    with watched_page(chromium, place.url) as page:
-        innovations = drive(place)
-        select(page)
         used = innovations[innovations["fused"]]
         seconds = (used["t_ns"] - innovations["t_ns"][-1]) * 1e-9
         for plot, values in (("range", used["measured"]), ("innovation", used["innovation"] / 0.1)):
@@ -100,13 +101,7 @@ def test_the_plots_show_every_measurement_where_it_belongs(chromium: Browser, pl
             assert len(marks(page, plot, "refused")) == len(REFUSED)
         expect(page.page.locator("[data-text='innovation']")).to_have_text("97 % in the band, 2 of 60 refused")
         assert page.page.locator("[data-plot='range'] path.expected").count() == 2
-        assert page.errors == []
 
-
-def test_the_minimum_speed_from_the_ranges_is_shown_beside_the_estimate(chromium: Browser, place: Place) -> None:
-    with watched_page(chromium, place.url) as page:
-        drive(place)
-        select(page)
         text = page.page.locator("[data-text='speed']").inner_text()
         rate = re.fullmatch(r"1\.00 m/s, its range changes by (.*) m/s", text)
         assert rate is not None
@@ -117,6 +112,12 @@ def test_the_minimum_speed_from_the_ranges_is_shown_beside_the_estimate(chromium
         half = len(minimum) // 2  # the upper edge; the lower one lies on zero
         assert np.median([y for _, y in minimum[:half]]) == pytest.approx(estimate[0][1], abs=6.0)
         assert {y for _, y in minimum[half:]} == {max(y for _, y in minimum)}
+
+        used, refused = (page.page.locator(f"[data-part='{part}'] li") for part in ("samples", "rejected"))
+        expect(used).to_have_text(["Used", "imu 12,040", "range 1,204"])
+        expect(refused).to_have_text(["Not used", "late 3", "range absurd 1"])
+        assert page.page.locator("[data-part='uncertainty']").is_hidden()  # the engine tells no parts
+        assert page.errors == []
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -167,21 +168,6 @@ def test_a_tag_without_innovations_has_no_plots(chromium: Browser, place: Place)
         assert page.errors == []
 
 
-def test_used_samples_are_counted_by_kind_and_rejected_ones_by_reason(chromium: Browser, place: Place) -> None:
-    drive(place)
-    tags = place.bench.answers.tags
-    row = tags.register("cart").row
-    tags.rows.count_samples("range", np.full(1204, row))
-    tags.rows.count_samples("imu", np.full(12040, row))
-    tags.rows.count_rejected(Reason.LATE, np.full(3, row))
-    tags.rows.count_rejected(Reason.RANGE_ABSURD, np.full(1, row))
-    with watched_page(chromium, place.url) as page:
-        select(page)
-        used, refused = (page.page.locator(f"[data-part='{part}'] li") for part in ("samples", "rejected"))
-        expect(used).to_have_text(["Used", "imu 12,040", "range 1,204"])
-        expect(refused).to_have_text(["Not used", "late 3", "range absurd 1"])
-
-
 def test_the_panel_can_be_focused_and_scrolled_with_the_keyboard(chromium: Browser, place: Place) -> None:
     drive(place)
     with watched_page(chromium, place.url, size=(1280, 600)) as page:
@@ -205,13 +191,6 @@ def test_the_panel_names_what_the_ellipse_comes_from_and_what_would_shrink_it(ch
         names = [line.split("\n")[0] for line in box.locator("li").all_inner_texts()]
         assert names == ["North", "Start", "Mounting", "Ranges"]
         assert page.errors == []
-
-
-def test_an_engine_that_tells_no_parts_shows_none(chromium: Browser, place: Place) -> None:
-    with watched_page(chromium, place.url) as page:
-        drive(place)
-        select(page)
-        assert page.page.locator("[data-part='uncertainty']").is_hidden()
 
 
 def test_north_that_others_know_is_applied_with_one_click_and_may_be_undone(chromium: Browser, place: Place) -> None:

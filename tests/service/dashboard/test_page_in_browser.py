@@ -39,7 +39,9 @@ def ambiguous(place: Place, tag: str, *modes: tuple[float, float, float]) -> Non
     place.bench.answers.latest.write(pose, hypotheses)
 
 
-def test_without_a_tag_the_page_shows_how_to_start_one(chromium: Browser, place: Place) -> None:
+def test_the_page_shows_how_to_start_a_tag_and_then_follows_it_on_the_map_and_in_the_table(
+    chromium: Browser, place: Place
+) -> None:
     with watched_page(chromium, place.url) as page:
         page.page.locator("#empty").wait_for(state="visible")
         page.wait_for("document.querySelector('#command').textContent.includes('--connect')")
@@ -47,13 +49,8 @@ def test_without_a_tag_the_page_shows_how_to_start_one(chromium: Browser, place:
         assert command.startswith(f"{sysconfig.get_path('scripts')}/dropanchor-tag simulate")
         assert "--connect tcp/127.0.0.1:19747" in command
         assert not page.page.locator("#credentials").is_visible()
-        place.move("cart", x=1.0, y=2.0)
-        page.page.locator("#empty").wait_for(state="hidden")
-
-
-def test_a_pose_is_a_dot_and_a_table_row_and_both_follow_the_tag(chromium: Browser, place: Place) -> None:
-    with watched_page(chromium, place.url) as page:
         place.move("cart", x=1.0, y=2.0, speed=0.5, t_ns=time.time_ns() + 60_000_000_000)  # it stays fresh
+        page.page.locator("#empty").wait_for(state="hidden")
         line = page.page.locator("tr[data-tag='cart']")
         assert line.inner_text().split()[:4] == ["cart", "Tracking", "1.00", "2.00"]
         page.wait_for_map(1)
@@ -61,6 +58,12 @@ def test_a_pose_is_a_dot_and_a_table_row_and_both_follow_the_tag(chromium: Brows
         place.move("cart", x=1.5, y=2.0)
         page.wait_for(f"dropanchor.tags()[0].x === 1.5 && dropanchor.tags()[0].pixel[0] > {before[0]} + 10")
         page.page.locator("tr[data-tag='cart'] td.c-x", has_text="1.50").wait_for()
+        page.wait_for_map(1)
+        x, y = page.tags()["cart"]["pixel"]
+        page.page.locator("#map").click(position={"x": x, "y": y})
+        expect(page.page.locator("#detail [data-part='name']")).to_have_text("cart")
+        page.page.locator("#map").click(position={"x": 40, "y": 300})
+        expect(page.page.locator("#detail")).to_be_hidden()
         assert page.errors == []
 
 
@@ -77,68 +80,58 @@ def test_only_a_fresh_tracked_pose_is_a_full_dot(chromium: Browser, place: Place
         while not seen[-1] and len(seen) < 20:
             seen.append(full())
         assert seen[-1] == {"TRACKING"}
+        page.page.locator("tr[data-tag='TRACKING'][data-stale='1']").wait_for()
+        page.wait_for(
+            "dropanchor.tags().find(({ tag }) => tag === 'TRACKING').state === 'coasting' && dropanchor.drawing().still"
+        )
+        assert colour_at(page, "TRACKING") != TRACKING_BLUE
 
 
-def test_an_old_pose_is_no_longer_a_full_dot(chromium: Browser, place: Place) -> None:
-    with watched_page(chromium, place.url) as page:
-        for _ in range(20):
-            place.move("cart", x=2.0, y=1.0, heading=np.nan, cov=np.eye(3) * 1e-6)
-            page.wait_for_map(1)
-            if colour_at(page, "cart") == TRACKING_BLUE:
-                break
-        else:
-            pytest.fail("a fresh pose was never a full dot")
-        page.page.locator("tr[data-tag='cart'][data-stale='1']").wait_for()
-        page.wait_for("dropanchor.tags()[0].state === 'coasting' && dropanchor.drawing().still")
-        assert colour_at(page, "cart") != TRACKING_BLUE
-
-
-def test_an_ambiguous_tag_is_shown_at_all_its_possible_positions(chromium: Browser, place: Place) -> None:
+def test_what_is_known_of_a_tag_is_shown_where_it_is_selected(chromium: Browser, place: Place) -> None:
+    """Each tag is one of its own kind."""
+    markup = "<img src=x onerror=alert(1)>"
     ambiguous(place, "cart", (0.6, 3.0, 4.0), (0.4, 3.0, -4.0))
+    place.bench.answers.tags.register("new")
+    place.move("a-1", "a-2", "a-10", x=[1.0, 2.0, 3.0], y=0.5, cov=np.diag([0.04, 0.01, 0.001]))
+    place.move("back", x=-12.34, y=-56.78, speed=-10.31, sigma_pos=0.25)
+    place.move(markup, x=1.0, y=1.0)
     with watched_page(chromium, place.url) as page:
+        name = page.page.locator("#detail [data-part='name']")
         page.page.locator("tr[data-tag='cart']").click()
         page.page.locator("#detail li").first.wait_for()
         texts = page.page.locator("#detail li").all_inner_texts()
         assert [text.split() for text in texts] == [["3.0,", "4.0", "m", "60", "%"], ["3.0,", "−4.0", "m", "40", "%"]]
         page.page.locator("[data-part='hint']", has_text="Walk a few metres").wait_for()
-        page.wait_for_map(1)
+        page.wait_for_map(6)
         assert colour_at(page, "cart") != TRACKING_BLUE
 
-
-def test_a_tag_without_a_pose_is_listed_as_initialising(chromium: Browser, place: Place) -> None:
-    place.bench.answers.tags.register("new")
-    with watched_page(chromium, place.url) as page:
         line = page.page.locator("tr[data-tag='new']")
-        line.wait_for()
         assert line.inner_text().split()[:4] == ["new", "Initialising", "–", "–"]
         line.click()
-        assert page.page.locator("#detail").is_visible()
-        assert page.errors == []
+        expect(name).to_have_text("new")
 
+        cell = page.page.locator("tbody td.c-tag", has_text="<img")
+        assert cell.get_attribute("title") == markup
+        cell.click()
+        expect(name).to_have_text(markup)
+        page.wait_for("document.querySelector('[data-part=\"v-turn\"]').textContent !== '–'")
 
-def test_selection_works_with_the_keyboard_alone(chromium: Browser, place: Place) -> None:
-    place.move("a-1", "a-2", "a-10", x=[1.0, 2.0, 3.0], y=0.5, cov=np.diag([0.04, 0.01, 0.001]))
-    with watched_page(chromium, place.url) as page:
-        page.page.locator("tr[data-tag='a-10']").wait_for()
+        assert page.page.locator("tr[data-tag='back'] td.c-speed").inner_text() == "−10.31"
+        for column in ("x", "y", "accuracy", "speed", "age"):
+            cell = page.page.locator(f"tr[data-tag='back'] td.c-{column}")
+            assert cell.evaluate("cell => cell.scrollWidth <= cell.clientWidth"), column
+
+        page.page.keyboard.press("Escape")
+        expect(page.page.locator("#detail")).to_be_hidden()
         page.page.locator("#table").focus()
         for key in ("ArrowDown", "ArrowDown", "ArrowDown", "Enter"):
             page.page.keyboard.press(key)
-        expect(page.page.locator("#detail [data-part='name']")).to_have_text("a-10")
+        expect(name).to_have_text("a-10")
         expect(page.page.locator("tr[aria-selected='true']")).to_have_attribute("data-tag", "a-10")
         expect(page.page.locator("#spoken")).to_contain_text("a-10 selected")
         page.page.keyboard.press("Escape")
         expect(page.page.locator("#detail")).to_be_hidden()
-
-
-def test_a_click_on_a_dot_selects_it_and_a_click_beside_it_deselects_it(chromium: Browser, place: Place) -> None:
-    place.move("cart", x=2.0, y=1.0)
-    with watched_page(chromium, place.url) as page:
-        page.wait_for_map(1)
-        x, y = page.tags()["cart"]["pixel"]
-        page.page.locator("#map").click(position={"x": x, "y": y})
-        expect(page.page.locator("#detail [data-part='name']")).to_have_text("cart")
-        page.page.locator("#map").click(position={"x": 40, "y": 300})
-        expect(page.page.locator("#detail")).to_be_hidden()
+        assert page.errors == []
 
 
 def test_the_map_moves_by_mouse_and_keys_and_returns_with_show_all(chromium: Browser, place: Place) -> None:
@@ -166,6 +159,11 @@ def test_the_map_moves_by_mouse_and_keys_and_returns_with_show_all(chromium: Bro
             return bool(page.page.evaluate(f"Math.abs(dropanchor.tags()[0].pixel[0] - {fitted[0]}) < 1"))
 
         wait_until(fits)  # repeated, since a late wheel event may zoom again
+        added = """() => fetch("api/v1/anchors/42", {
+            method: "PUT", headers: {"content-type": "application/json"}, body: '{"id": "42", "x": 80, "y": 0}',
+        }).then((answer) => answer.status)"""
+        assert page.page.evaluate(added) in (200, 201)
+        page.wait_for(f"dropanchor.tags()[0].pixel[0] < {fitted[0]} - 100")  # the new anchor fits, too
 
 
 def test_names_and_states_filter_table_and_map(chromium: Browser, place: Place) -> None:
@@ -196,32 +194,6 @@ def test_dark_follows_the_system_until_the_user_chooses(chromium: Browser, place
         assert page.page.evaluate(ground) == "rgb(244, 246, 248)"
 
 
-def test_names_from_tags_are_text_never_markup(chromium: Browser, place: Place) -> None:
-    name = "<img src=x onerror=alert(1)>"
-    place.move(name, x=1.0, y=1.0)
-    with watched_page(chromium, place.url) as page:
-        cell = page.page.locator("tbody tr:visible td.c-tag")
-        cell.wait_for()
-        assert cell.inner_text().startswith("<img")
-        assert cell.get_attribute("title") == name
-        cell.click()
-        expect(page.page.locator("#detail [data-part='name']")).to_have_text(name)
-        page.wait_for("document.querySelector('[data-part=\"v-turn\"]').textContent !== '–'")
-        assert page.errors == []
-
-
-def test_a_new_anchor_appears_without_a_reload(chromium: Browser, place: Place) -> None:
-    with watched_page(chromium, place.url) as page:
-        added = """() => fetch("api/v1/anchors/42", {
-            method: "PUT", headers: {"content-type": "application/json"}, body: '{"id": "42", "x": 80, "y": 0}',
-        }).then((answer) => answer.status)"""
-        place.move("cart", x=1.0, y=1.0)
-        page.wait_for_map(1)
-        narrow = page.tags()["cart"]["pixel"][0]
-        assert page.page.evaluate(added) in (200, 201)
-        page.wait_for(f"dropanchor.tags()[0].pixel[0] < {narrow} - 100")
-
-
 def test_the_page_reconnects_by_itself_after_a_restart_of_the_service(chromium: Browser) -> None:
     bench = live_api_bench()
     with ExitStack() as open_pages:
@@ -248,14 +220,3 @@ def test_ten_thousand_tags_are_drawn_as_density_with_few_table_rows(chromium: Br
         page.page.locator("#crowd").wait_for()
         assert page.page.locator("tbody tr").count() < 60
         assert page.errors == []
-
-
-def test_a_negative_speed_can_be_read_in_the_table(chromium: Browser, place: Place) -> None:
-    place.move("a", x=-12.34, y=-56.78, speed=-10.31, sigma_pos=0.25)
-    with watched_page(chromium, place.url, size=(1280, 800)) as page:
-        speed = page.page.locator("tr[data-tag='a'] td.c-speed")
-        speed.wait_for()
-        assert speed.inner_text() == "−10.31"
-        for column in ("x", "y", "accuracy", "speed", "age"):
-            cell = page.page.locator(f"tr[data-tag='a'] td.c-{column}")
-            assert cell.evaluate("cell => cell.scrollWidth <= cell.clientWidth"), column

@@ -94,6 +94,13 @@ def test_a_link_leads_to_a_moment_of_the_past_and_back_to_the_present(
         place.move("first", x=-4.0)  # the present goes on, but the past does not show it
         page.page.wait_for_timeout(600)
         assert page.tags()["first"]["x"] == pytest.approx(30.5, abs=0.01)
+        page.page.goto(link_to(place, end_ns, 155, tag="first"))
+        page.wait_for("dropanchor.tags()[0]?.x > 150")
+        assert {tag: known["state"] for tag, known in page.tags().items()} == {
+            "first": "tracking",
+            "second": "ambiguous",
+            "turned": "relative",
+        }
         page.page.locator("[data-part='leave']").click()
         page.wait_for("dropanchor.past() === false && dropanchor.tags()[0].x === -4")
         expect(page.page.locator("#status-text")).to_have_text("Live")
@@ -101,18 +108,13 @@ def test_a_link_leads_to_a_moment_of_the_past_and_back_to_the_present(
         assert page.errors == []
 
 
-def test_an_ambiguous_stretch_is_ambiguous_in_the_past_too(chromium: Browser, past: tuple[Place, int]) -> None:
+def test_the_keyboard_plays_and_moves_the_clock_and_the_map_follows(chromium: Browser, past: tuple[Place, int]) -> None:
     place, end_ns = past
-    with watched_page(chromium, link_to(place, end_ns, 155)) as page:
+    with watched_page(chromium, link_to(place, end_ns, 0, speed="50", tag="first")) as page:
         wait_for_past(page, 3)
-        tags = page.tags()
-        assert (tags["second"]["state"], tags["first"]["state"]) == ("ambiguous", "tracking")
-
-
-def test_the_keyboard_plays_and_moves_the_clock(chromium: Browser, past: tuple[Place, int]) -> None:
-    place, end_ns = past
-    with watched_page(chromium, link_to(place, end_ns, 0, speed="50")) as page:
-        wait_for_past(page, 3)
+        asked = "performance.getEntriesByType('resource').some(({ name }) => /max_points=5000&tags=first/.test(name))"
+        page.wait_for(asked)  # for the line of the chosen tag
+        page.page.locator("[data-part='follow']").click()
         slider = page.page.locator("[data-part='slider']")
         slider.focus()
         page.page.keyboard.press("ArrowRight")
@@ -130,24 +132,11 @@ def test_the_keyboard_plays_and_moves_the_clock(chromium: Browser, past: tuple[P
         page.page.keyboard.press(" ")
         page.wait_for("!dropanchor.past().playing && dropanchor.tags()[0].x === 300")  # it stops at the end
         page.wait_for(f"location.hash.includes('at={iso(end_ns)}')")
-        assert page.errors == []
-
-
-def test_the_map_follows_a_tag_through_the_past(chromium: Browser, past: tuple[Place, int]) -> None:
-    place, end_ns = past
-    with watched_page(chromium, link_to(place, end_ns, 0, speed="20", tag="first")) as page:
-        wait_for_past(page, 3)
-        asked = "performance.getEntriesByType('resource').some(({ name }) => /max_points=5000&tags=first/.test(name))"
-        page.wait_for(asked)  # for the line of the chosen tag
-        page.page.locator("[data-part='follow']").click()
-        page.page.locator("[data-part='play']").click()
-        page.wait_for("dropanchor.tags()[0]?.x > 60")
-        page.page.locator("[data-part='play']").click()
-        page.wait_for("!dropanchor.past().playing && dropanchor.drawing().still")
+        page.wait_for("dropanchor.drawing().still")
         box = page.page.locator("#map").bounding_box()
         assert box is not None
-        x, y = page.tags()["first"]["pixel"]
-        assert (x, y) == pytest.approx((box["width"] / 2, box["height"] / 2), abs=3)
+        assert page.tags()["first"]["pixel"] == pytest.approx([box["width"] / 2, box["height"] / 2], abs=3)
+        assert page.errors == []
 
 
 def test_figures_and_the_file_of_a_tag(chromium: Browser, past: tuple[Place, int]) -> None:

@@ -140,13 +140,16 @@ def test_the_distance_between_two_points_scales_a_plan_and_one_place_moves_it(
         assert abs(place_of(plan, 100, 100) - (3 - 2j)) < 0.3
 
 
-def test_the_residual_of_three_points_is_shown(chromium: Browser, place: PlanPlace) -> None:
+def test_a_plan_is_aligned_moved_and_changed_by_hand_and_deleted(chromium: Browser, place: PlanPlace) -> None:
     points = [(0, 0, -10, 5), (400, 0, 10, 5), (400, 200, 10, -5.6)]
-    place.put("hall", image_file(WIDTH, HEIGHT), control_points=[
+    place.put("measured", image_file(WIDTH, HEIGHT), control_points=[
         ControlPoint(column_px=column, row_px=row, x=x, y=y) for column, row, x, y in points
     ])  # fmt: skip
+    place.put("hall", image_file(WIDTH, HEIGHT))
+    mine = place.put("shared", image_file(WIDTH, HEIGHT))
     with watched_page(chromium, place.url) as page:
-        form = edit(page, open_panel(page), "hall")
+        panel, outcome = open_panel(page), page.page.locator("#outcome")
+        form = edit(page, panel, "measured")
         expect(form.get_by_text("at most 0.60 m off")).to_be_visible()
         form.get_by_label("Point 3: y in m").fill("-5.3")
         off = residuals_of([*points[:2], (400, 200, 10, -5.3)])
@@ -154,12 +157,10 @@ def test_the_residual_of_three_points_is_shown(chromium: Browser, place: PlanPla
         expect(form.locator("li small")).to_have_text([f"{one:.2f} m off" for one in off])
         form.get_by_role("button", name="Remove point 3").click()
         expect(form.get_by_text("at most")).to_be_hidden()
+        form.get_by_role("button", name="Save plan").click()
+        expect(form).to_be_hidden()
 
-
-def test_a_plan_is_moved_turned_scaled_and_faded_by_hand(chromium: Browser, place: PlanPlace) -> None:
-    place.put("hall", image_file(WIDTH, HEIGHT))
-    with watched_page(chromium, place.url) as page:
-        form = edit(page, open_panel(page), "hall")
+        edit(page, panel, "hall")
         form.get_by_role("button", name="Move by hand").click()
         page.page.locator("#map").focus()
         page.page.keyboard.press("Shift+ArrowRight")
@@ -184,7 +185,36 @@ def test_a_plan_is_moved_turned_scaled_and_faded_by_hand(chromium: Browser, plac
         assert (plan.placement.x, plan.opacity) == (7.0, 0.3)
         assert plan.placement.m_per_px == pytest.approx(0.1)
         assert plan.placement.rotation_rad == pytest.approx(math.pi / 2)
-        assert page.errors == []
+
+        edit(page, panel, "shared")
+        form.get_by_label("Name").fill("Mine")
+        place.plans.put("shared", mine.model_copy(update={"name": "Theirs"}))
+        form.get_by_role("button", name="Save plan").click()
+        expect(outcome).to_contain_text("Somebody else changed this meanwhile")
+        assert place.plans.all["shared"].name == "Theirs"
+        outcome.get_by_role("button", name="Take the newer one").click()
+        expect(form.get_by_label("Name")).to_have_value("Theirs")
+        form.get_by_role("button", name="Save plan").click()
+        expect(form).to_be_hidden()
+
+        plan = place.plans.all["shared"]
+        edit(page, panel, "Theirs")
+        form.get_by_role("button", name="Move by hand").click()
+        x = page.page.evaluate("dropanchor.draft().placement.x")
+        for _ in range(2):
+            page.page.locator("#map").press("Shift+ArrowRight")
+        page.wait_for(f"dropanchor.draft().placement.x === {x} + 2")
+        expect(outcome).to_contain_text("Plan moved. Not saved yet.")
+        page.page.keyboard.press("Control+z")
+        page.wait_for(f"dropanchor.draft().placement.x === {x}")
+        form.get_by_role("button", name="Delete…").click()
+        page.page.get_by_role("dialog").get_by_role("button", name="Delete").click()
+        expect(outcome).to_contain_text("Plan Theirs deleted.")
+        page.wait_for("dropanchor.plans().length === 2")
+        page.page.keyboard.press("Control+z")
+        wait_until(lambda: place.plans.all.get("shared") == plan)
+        page.wait_for("dropanchor.plans().length === 3")
+        assert [error for error in page.errors if "412" not in error] == []
 
 
 def test_the_map_shows_the_pixels_of_the_plan_in_light_and_inverted_in_dark(
@@ -210,55 +240,23 @@ def test_the_map_shows_the_pixels_of_the_plan_in_light_and_inverted_in_dark(
         wait_until(is_inverted)
 
 
-def test_the_buttons_appear_although_the_first_request_for_the_access_fails(
-    chromium: Browser, place: PlanPlace
-) -> None:
-    with watched_page(chromium, place.url) as page:
-        page.page.route("**/api/v1/access", lambda route: route.abort(), times=2)
-        page.page.reload()
-        expect(page.page.get_by_role("button", name="Set up floor plans")).to_be_visible()
-
-
-def test_an_image_that_did_not_arrive_is_requested_again(chromium: Browser, place: PlanPlace) -> None:
+def test_what_did_not_arrive_at_first_is_requested_again(chromium: Browser, place: PlanPlace) -> None:
     with watched_page(chromium, place.url) as page:
         page.page.route("**/plan-images/*", lambda route: route.abort(), times=1)
         place.put("hall", image_file(WIDTH, HEIGHT))
         page.wait_for("dropanchor.plans().length === 1")
         page.wait_for("dropanchor.plans()[0].isReady")
+        page.page.route("**/api/v1/access", lambda route: route.abort(), times=2)
+        page.page.reload()
+        expect(page.page.get_by_role("button", name="Set up floor plans")).to_be_visible()
 
 
-@pytest.mark.parametrize(
-    ("uploaded", "size"),
-    [
+def test_a_file_that_is_refused_says_why_and_every_other_kind_is_shown(chromium: Browser, place: PlanPlace) -> None:
+    shown: list[tuple[FilePayload, tuple[int, int]]] = [
         (file("a.svg", "image/svg+xml", svg_file('<rect width="100" height="50" fill="red"/>')), (4096, 2048)),
-        (file("a.jpg", "image/jpeg", image_file(WIDTH, HEIGHT, "JPEG")), (WIDTH, HEIGHT)),
-        (file("a.tif", "image/tiff", image_file(WIDTH, HEIGHT, "TIFF")), (WIDTH, HEIGHT)),
-    ],
-    ids=["svg", "jpeg", "tiff"],
-)
-def test_other_files_are_shown_too(
-    chromium: Browser, place: PlanPlace, uploaded: FilePayload, size: tuple[int, int]
-) -> None:
-    with watched_page(chromium, place.url) as page:
-        add(open_panel(page), uploaded)
-        image = place.plans.all["a"].image
-        assert (image.width_px, image.height_px) == size
-        page.wait_for("dropanchor.plans()[0].isReady")
-        assert page.errors == []
-
-
-def test_a_page_of_a_pdf_is_chosen(chromium: Browser, place: PlanPlace) -> None:
-    with watched_page(chromium, place.url) as page:
-        panel = open_panel(page)
-        expect(panel.get_by_label("Page")).to_be_hidden()
-        panel.get_by_label("File").set_input_files(file("hall.pdf", "application/pdf", pdf_file((72, 72), (144, 72))))
-        panel.get_by_label("Page").fill("2")
-        panel.get_by_role("button", name="Add plan").click()
-        expect(panel.get_by_role("form", name="Floor plan", exact=True)).to_be_visible()
-        assert place.plans.all["hall"].image.width_px == 400
-
-
-def test_a_file_that_is_refused_says_why(chromium: Browser, place: PlanPlace) -> None:
+        (file("b.jpg", "image/jpeg", image_file(WIDTH, HEIGHT, "JPEG")), (WIDTH, HEIGHT)),
+        (file("c.tif", "image/tiff", image_file(WIDTH, HEIGHT, "TIFF")), (WIDTH, HEIGHT)),
+    ]
     with watched_page(chromium, place.url) as page:
         panel = open_panel(page)
         for content, words in (
@@ -269,6 +267,18 @@ def test_a_file_that_is_refused_says_why(chromium: Browser, place: PlanPlace) ->
             panel.get_by_role("button", name="Add plan").click()
             expect(panel.get_by_role("alert")).to_contain_text(words)
         assert place.plans.all == {}
+        for uploaded, size in shown:
+            form = add(panel, uploaded)
+            image = place.plans.all[uploaded["name"][0]].image
+            assert (image.width_px, image.height_px) == size
+            page.wait_for(f"dropanchor.plans().filter(({{ isReady }}) => isReady).length === {len(place.plans.all)}")
+            form.get_by_role("button", name="Cancel").click()
+        expect(panel.get_by_label("Page")).to_be_hidden()
+        panel.get_by_label("File").set_input_files(file("hall.pdf", "application/pdf", pdf_file((72, 72), (144, 72))))
+        panel.get_by_label("Page").fill("2")
+        panel.get_by_role("button", name="Add plan").click()
+        expect(form).to_be_visible()
+        assert place.plans.all["hall"].image.width_px == 400
         assert all("422" in error for error in page.errors)
 
 
@@ -306,20 +316,6 @@ def test_a_point_is_placed_by_latitude_and_longitude(chromium: Browser) -> None:
         assert abs(complex(point.x, point.y) - there) < 0.01
 
 
-def test_a_change_of_another_page_is_not_overwritten(chromium: Browser, place: PlanPlace) -> None:
-    mine = place.put("hall", image_file(WIDTH, HEIGHT))
-    with watched_page(chromium, place.url) as page:
-        form = edit(page, open_panel(page), "hall")
-        form.get_by_label("Name").fill("Mine")
-        place.plans.put("hall", mine.model_copy(update={"name": "Theirs"}))
-        form.get_by_role("button", name="Save plan").click()
-        outcome = page.page.locator("#outcome")
-        expect(outcome).to_contain_text("Somebody else changed this meanwhile")
-        assert place.plans.all["hall"].name == "Theirs"
-        outcome.get_by_role("button", name="Take the newer one").click()
-        expect(form.get_by_label("Name")).to_have_value("Theirs")
-
-
 @pytest.mark.parametrize(("scope", "edits", "deletes"), [(Scope.READ, 0, 0), (Scope.WRITE, 1, 0), (Scope.ADMIN, 1, 1)])
 def test_a_key_shows_the_plans_and_only_the_buttons_that_it_may_use(
     chromium: Browser, tmp_path: Path, scope: Scope, edits: int, deletes: int
@@ -340,27 +336,3 @@ def test_a_key_shows_the_plans_and_only_the_buttons_that_it_may_use(
             form = edit(page, open_panel(page), "hall")
             expect(form.get_by_role("button", name="Save plan")).to_be_visible()
             expect(form.get_by_role("button", name="Delete…")).to_have_count(deletes)
-
-
-def test_a_moved_plan_goes_back_and_one_deleted_after_a_question_comes_back(
-    chromium: Browser, place: PlanPlace
-) -> None:
-    plan = place.put("hall", image_file(WIDTH, HEIGHT), name="Hall")
-    with watched_page(chromium, place.url) as page:
-        form = edit(page, open_panel(page), "Hall")
-        form.get_by_role("button", name="Move by hand").click()
-        x = page.page.evaluate("dropanchor.draft().placement.x")
-        for _ in range(2):
-            page.page.locator("#map").press("Shift+ArrowRight")
-        page.wait_for(f"dropanchor.draft().placement.x === {x} + 2")
-        expect(page.page.locator("#outcome")).to_contain_text("Plan moved. Not saved yet.")
-        page.page.keyboard.press("Control+z")
-        page.wait_for(f"dropanchor.draft().placement.x === {x}")
-        form.get_by_role("button", name="Delete…").click()
-        page.page.get_by_role("dialog").get_by_role("button", name="Delete").click()
-        expect(page.page.locator("#outcome")).to_contain_text("Plan Hall deleted.")
-        page.wait_for("dropanchor.plans().length === 0")
-        page.page.keyboard.press("Control+z")
-        wait_until(lambda: place.plans.all == {"hall": plan})
-        page.wait_for("dropanchor.plans().length === 1")
-        assert page.errors == []

@@ -48,7 +48,7 @@ def drag(page: WatchedPage, handle: Locator, dx: int, dy: int) -> None:
     page.page.mouse.up()
 
 
-def test_a_polygon_is_drawn_with_clicks_and_watched_at_once(chromium: Browser, yard: ZonePlace) -> None:
+def test_zones_are_drawn_and_edited_with_pointer_and_keyboard(chromium: Browser, yard: ZonePlace) -> None:
     with watched_page(chromium, yard.url) as page:
         form = open_list(page)
         page.page.get_by_role("button", name="New polygon").click()
@@ -76,12 +76,7 @@ def test_a_polygon_is_drawn_with_clicks_and_watched_at_once(chromium: Browser, y
         assert (x1 - x0) / (y0 - y2) == pytest.approx(1.2, rel=0.02)
         yard.go("cart-3", (x0 + x1) / 2, (y0 + y2) / 2, z=4.0, z_std=0.1)
         expect(page.page.locator("#events summary")).to_contain_text("cart-3 entered Gate 7")
-        assert page.errors == []
 
-
-def test_corners_are_dragged_added_and_removed(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url) as page:
-        form = open_list(page)
         page.page.get_by_role("button", name="Edit Yard").click()
         expect(form.get_by_label("Name")).to_be_focused()
         drag(page, page.page.get_by_role("button", name="Corner 1 of 4"), -40, 20)
@@ -95,12 +90,7 @@ def test_corners_are_dragged_added_and_removed(chromium: Browser, yard: ZonePlac
         assert third == [1.0, 5.0]
         assert fourth[0] < 0.9
         assert yard.zones["yard"].name == "Yard"
-        assert page.errors == []
 
-
-def test_a_zone_is_made_with_the_keyboard_alone(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url) as page:
-        form = open_list(page)
         page.page.get_by_role("button", name="New polygon").press("Enter")
         expect(form.get_by_label("Name")).to_be_focused()
         page.page.keyboard.type("Keys")
@@ -115,12 +105,7 @@ def test_a_zone_is_made_with_the_keyboard_alone(chromium: Browser, yard: ZonePla
         form.get_by_label("Name").press("Enter")
         expect(form).to_be_hidden()
         assert len(points_of(yard, "keys")) == 3
-        assert page.errors == []
 
-
-def test_a_circle_is_placed_sized_and_edited(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url) as page:
-        form = open_list(page)
         page.page.get_by_role("button", name="New circle").click()
         page.page.locator("#map").click(position={"x": 300, "y": 500})
         drag(page, page.page.get_by_role("button", name="Radius"), 30, 0)
@@ -134,28 +119,6 @@ def test_a_circle_is_placed_sized_and_edited(chromium: Browser, yard: ZonePlace)
         form.get_by_role("button", name="Save zone").click()
         expect(form).to_be_hidden()
         assert yard.zones["pit"].shape == drawn.model_copy(update={"radius_m": 2.5})
-        assert page.errors == []
-
-
-def test_another_panel_waits_for_a_save_that_takes_its_time_and_asks_nothing(
-    chromium: Browser, yard: ZonePlace
-) -> None:
-    with watched_page(chromium, yard.url) as page:
-        form = open_list(page)
-        held: list[Route] = []
-        page.page.route(
-            "**/zones/yard", lambda route: held.append(route) if route.request.method == "PUT" else route.continue_()
-        )
-        page.page.get_by_role("button", name="Edit Yard").click()
-        form.get_by_label("Name").fill("Depot")
-        form.get_by_role("button", name="Save zone").click()
-        page.page.locator("#edit").click()
-        expect(form).to_be_visible()
-        expect(page.page.locator("#confirm")).to_be_hidden()
-        held[0].continue_()
-        expect(page.page.locator("#setup")).to_be_visible()
-        expect(form).to_be_hidden()
-        assert yard.zones["yard"].name == "Depot"
         assert page.errors == []
 
 
@@ -176,7 +139,9 @@ def test_a_polygon_that_crosses_itself_is_refused_in_words_at_its_place(chromium
         assert set(yard.zones) == {"yard", "dock"}
 
 
-def test_a_change_of_somebody_else_is_not_overwritten(chromium: Browser, yard: ZonePlace) -> None:
+def test_what_others_changed_meanwhile_is_not_overwritten_and_a_deletion_asks(
+    chromium: Browser, yard: ZonePlace
+) -> None:
     with watched_page(chromium, yard.url) as page:
         form = open_list(page)
         page.page.get_by_role("button", name="Edit Yard").click()
@@ -193,10 +158,6 @@ def test_a_change_of_somebody_else_is_not_overwritten(chromium: Browser, yard: Z
         expect(form).to_be_hidden()
         assert (yard.zones["yard"].name, points_of(yard, "yard")[0]) == ("Ours", [2.0, 2.0])
 
-
-def test_a_new_zone_never_replaces_one_that_somebody_else_has_just_made(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url) as page:
-        form = open_list(page)
         page.page.get_by_role("button", name="New circle").click()
         page.page.locator("#map").click(position={"x": 300, "y": 300})
         form.get_by_label("Name").fill("Gate")
@@ -209,11 +170,7 @@ def test_a_new_zone_never_replaces_one_that_somebody_else_has_just_made(chromium
         expect(form).to_be_hidden()
         assert (yard.zones["gate"].name, yard.zones["gate-2"].name) == ("Theirs", "Gate")
 
-
-def test_a_zone_is_deleted_only_after_a_confirmation(chromium: Browser, yard: ZonePlace) -> None:
-    with watched_page(chromium, yard.url) as page:
-        form = open_list(page)
-        page.page.get_by_role("button", name="Edit Yard").click()
+        page.page.get_by_role("button", name="Edit Ours").click()
         form.get_by_role("button", name="Delete…").click()
         expect(form.get_by_role("button", name="Delete zone")).to_be_focused()
         form.get_by_role("button", name="Keep it").click()
@@ -221,9 +178,23 @@ def test_a_zone_is_deleted_only_after_a_confirmation(chromium: Browser, yard: Zo
         form.get_by_role("button", name="Delete…").click()
         form.get_by_role("button", name="Delete zone").click()
         expect(form).to_be_hidden()
-        assert set(yard.zones) == {"dock"}
-        expect(page.page.locator("#zone-list li")).to_have_count(1)
-        assert page.errors == []
+        assert set(yard.zones) == {"dock", "gate", "gate-2"}
+        expect(page.page.locator("#zone-list li")).to_have_count(3)
+
+        held: list[Route] = []
+        page.page.route(
+            "**/zones/dock", lambda route: held.append(route) if route.request.method == "PUT" else route.continue_()
+        )
+        page.page.get_by_role("button", name="Edit Dock").click()
+        form.get_by_label("Name").fill("Depot")
+        form.get_by_role("button", name="Save zone").click()
+        page.page.locator("#edit").click()
+        expect(form).to_be_visible()
+        expect(page.page.locator("#confirm")).to_be_hidden()
+        held[0].continue_()
+        expect(page.page.locator("#setup")).to_be_visible()
+        expect(form).to_be_hidden()
+        assert yard.zones["dock"].name == "Depot"
 
 
 @pytest.mark.parametrize(("scope", "edits", "deletes"), [(Scope.READ, 0, 0), (Scope.WRITE, 2, 0), (Scope.ADMIN, 2, 1)])
