@@ -1,9 +1,11 @@
-"""Somebody moves the only anchor of a running service, and tells nobody at first."""
+"""Somebody moves the only anchor of a running service and tells nobody at first, or corrects its place."""
 
+import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import takewhile
+from pathlib import Path
 from typing import Any
 
 from dropanchor_schemas.pose import StateReason
@@ -16,6 +18,9 @@ from support.zenoh_router import wait_until
 
 SEED = 48_811
 FARTHER_X = 8.0  # m, to where somebody moves the anchor
+CORRECTED_X = 300.0
+WAY_M = 100.0  # further than the tag drives meanwhile
+FOUND_AGAIN_NS = 15 * 10**9  # sooner than a tag that starts afresh is found
 BEGAN_S = 60.0  # ago: long enough for this tag to be found
 
 
@@ -80,3 +85,22 @@ def test_tags_of_an_anchor_that_somebody_moves_are_ambiguous_until_its_place_is_
         assert all(pose["hint"].startswith("Anchor 1 seems to have moved by ") for pose in poses)
         service.put("/api/v1/anchors/1", {"id": "1", "x": FARTHER_X})
         sender.until(service, lambda pose: not is_doubted(pose))
+
+
+def test_the_tags_of_a_corrected_anchor_shift_with_it_and_back_also_over_a_restart(tmp_path: Path) -> None:
+    sender, options = Sender(), ("--data-dir", str(tmp_path))
+
+    def tracked(service: Running) -> dict[str, Any]:
+        return sender.until(service, lambda pose: bool(pose["state"] == "tracking"))[0]
+
+    with running_service(*options) as service:
+        before = tracked(service)
+        service.put("/api/v1/anchors/1", {"id": "1", "x": CORRECTED_X})
+        shifted = tracked(service)
+        assert abs(shifted["x"] - before["x"] - CORRECTED_X) < WAY_M
+        assert shifted["t_ns"] - before["t_ns"] < FOUND_AGAIN_NS
+        service.stop(signal.SIGTERM)
+    with running_service(*options) as service:
+        service.put("/api/v1/anchors/1", {"id": "1", "x": 0.0})
+        back = tracked(service)
+    assert abs(back["x"] - before["x"]) < WAY_M

@@ -13,9 +13,7 @@ from support.patience import PATIENCE_S
 from support.service import command, environment, running_service
 from support.zenoh_router import (
     free_endpoint,
-    free_port,
     running_router,
-    start_router_process,
     wait_until,
 )
 
@@ -29,16 +27,6 @@ def run(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
         timeout=PATIENCE_S,
         check=False,
     )
-
-
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_the_service_at_once_even_with_a_stream_open(how: signal.Signals) -> None:
-    with running_service() as service, httpx.stream("GET", f"{service.url}/api/v1/stream") as stream:
-        assert stream.status_code == 200
-        started = time.monotonic()
-        assert service.stop(how) == 0
-        assert time.monotonic() - started < 30.0
-    assert "Traceback" not in "".join(service.log)
 
 
 def test_a_taken_http_port_is_reported_in_one_sentence() -> None:
@@ -71,16 +59,25 @@ def test_bad_settings_are_reported_with_file_and_key(tmp_path: Path) -> None:
     assert "the environment: max_tags" in result.stderr
 
 
-def test_a_change_over_rest_survives_a_restart(tmp_path: Path) -> None:
-    for _ in range(2):
-        with running_service("--data-dir", str(tmp_path)) as service:
+def test_a_signal_ends_a_service_at_once_even_with_a_stream_open_and_a_change_over_rest_survives(
+    tmp_path: Path,
+) -> None:
+    for how in (signal.SIGINT, signal.SIGTERM):
+        with (
+            running_service("--data-dir", str(tmp_path)) as service,
+            httpx.stream("GET", f"{service.url}/api/v1/stream") as stream,
+        ):
+            assert stream.status_code == 200
             anchors = service.get("/api/v1/anchors")["anchors"]
             service.put("/api/v1/anchors/gate", {"id": "gate", "x": 1.5, "y": 2.0, "z": 0.0})
-            assert service.stop() == 0
+            started = time.monotonic()
+            assert service.stop(how) == 0
+            assert time.monotonic() - started < 30.0
+        assert "Traceback" not in "".join(service.log)
     assert [(anchor["id"], anchor["x"]) for anchor in anchors] == [("gate", 1.5)]
 
 
-def test_the_service_is_not_ready_without_its_router_and_ready_again_with_it() -> None:
+def test_a_service_is_ready_while_the_router_of_the_command_runs_and_both_stop_on_a_signal() -> None:
     endpoint = free_endpoint()
 
     def is_ready() -> bool:
@@ -90,31 +87,18 @@ def test_the_service_is_not_ready_without_its_router_and_ready_again_with_it() -
         problem = service.ask("GET", "/api/v1/health/ready")
         assert problem.status_code == 503
         assert "no connection to the Zenoh router" in problem.text
-        router = start_router_process(endpoint)
-        try:
-            wait_until(is_ready)
-            router.kill()
-            wait_until(lambda: not is_ready())
-        finally:
-            router.kill()
-            router.communicate()
+        words = command("router", "--zenoh-listen", endpoint)
+        with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment()) as router:
+            try:
+                assert router.stderr is not None
+                assert f"ready at {endpoint}" in router.stderr.readline()
+                wait_until(is_ready)
+                router.send_signal(signal.SIGTERM)
+                assert router.wait(PATIENCE_S) == 0
+                wait_until(lambda: not is_ready())
+            finally:
+                router.kill()
         assert service.stop() == 0
-
-
-def test_the_router_command_routes_between_a_service_and_its_tags_and_stops_on_a_signal() -> None:
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
-    with subprocess.Popen(
-        command("router", "--zenoh-listen", endpoint), stderr=subprocess.PIPE, text=True, env=environment()
-    ) as router:
-        try:
-            assert router.stderr is not None
-            assert f"ready at {endpoint}" in router.stderr.readline()
-            with running_service("--zenoh-connect", endpoint) as service:
-                assert service.stop() == 0
-            router.send_signal(signal.SIGTERM)
-            assert router.wait(PATIENCE_S) == 0
-        finally:
-            router.kill()
 
 
 def test_the_help_contains_examples() -> None:
