@@ -35,7 +35,7 @@ NOT_SHOWN = {
         *("basemap", "events", "figures", "heat_map", "period", "poses", "track_file", "tracks", "site_of_request"),
     ),
     "only programs use these": (
-        *("ingest", "ingest_health", "ingest_phyphox", "recordings", "remote_settings", "oidc"),
+        *("features", "ingest", "ingest_health", "ingest_phyphox", "recordings", "remote_settings", "oidc"),
     ),
     "these speak while the service starts, and not to the page": ("health", "folder", "authority", "certificate"),
 }

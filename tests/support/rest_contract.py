@@ -29,6 +29,7 @@ BEYOND_THE_SCHEMA = {
     "get_figures": [positive_data_acceptance],
     "get_heat_map": [positive_data_acceptance],
     "get_history_coverage": [positive_data_acceptance],
+    "list_features": [positive_data_acceptance],
     "list_events": [positive_data_acceptance],
     "list_changes": [positive_data_acceptance],
     "get_changes_file": [positive_data_acceptance],

@@ -7,6 +7,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
 from dropanchor_schemas.answers import Problem, SamplesAcknowledged
+from dropanchor_schemas.features import FeatureItemAlone, FeaturePage
 from dropanchor_schemas.geojson import PoseFeatureCollection, TimedPoseFeature, TrackFeatureCollection
 from dropanchor_schemas.pose import PoseFrame
 from dropanchor_schemas.samples import SamplesMessage
@@ -25,6 +26,8 @@ def openapi_of(app: FastAPI) -> dict[str, Any]:
             title=app.title, version=app.version, description=_DESCRIPTION, routes=app.routes, tags=_TAGS
         )
         for model in (
+            FeatureItemAlone,
+            FeaturePage,
             PoseFeatureCollection,
             PoseFrame,
             Problem,
@@ -82,6 +85,7 @@ _REFUSALS = (
 )
 _TAGS = [
     {"name": "poses", "description": "Where the tags are."},
+    {"name": "features", "description": "Tags, zones and tracks for programs of maps: OGC API – Features."},
     {"name": "tags", "description": "What the tags have sent, and their settings."},
     {"name": "site", "description": "The site frame, its georeference, and the anchors."},
     {"name": "plans", "description": "Floor plans below the tags on the map, and their images."},
