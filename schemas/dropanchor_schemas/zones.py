@@ -86,11 +86,21 @@ class ZoneList(BaseModel):
     zones: list[Zone]
 
 
+class TagInZone(BaseModel):
+    """A tag in a zone, and since when."""
+
+    tag: Id
+    since_ns: int = Field(description="When it entered, UTC in ns.")
+
+
 class ZoneOccupancy(BaseModel):
-    """How many tags are in a zone."""
+    """How many tags are in a zone, and which if that was asked for."""
 
     zone: Id
     tags: int = Field(ge=1, description="Tags that have entered and not left, with the certainty of an event.")
+    inside: list[TagInZone] | None = Field(
+        default=None, description="The tags, those first that have been there longest; with `names=true` only."
+    )
 
 
 class ZoneOccupancyList(BaseModel):

@@ -34,6 +34,13 @@ class StoredEvent(NamedTuple):
     body: bytes
 
 
+class Occupant(NamedTuple):
+    """A tag in a zone, and when it came."""
+
+    tag: str
+    since_ns: int
+
+
 @dataclass(frozen=True)
 class Selection:
     """Which events. An empty list selects all."""
@@ -137,16 +144,12 @@ class EventStore:
         rows = self.database.rows("SELECT source, item, tag, other, flags, since_ns FROM states")
         return {StateKey(*row[:4]): StateValue(*row[4:]) for row in rows}
 
-    def occupancy(self) -> list[tuple[str, int]]:
-        """Return each zone that is not empty, and how many tags are inside."""
-        return [(zone, len(tags)) for zone, tags in self.occupants().items()]
-
-    def occupants(self) -> dict[str, list[str]]:
-        """Return the tags in each zone that is not empty."""
-        inside: dict[str, list[str]] = {}
-        sql = "SELECT item, tag FROM states WHERE source = 'zone' ORDER BY item, tag"
-        for zone, tag in self.database.rows(sql) if self.database.is_made else ():
-            inside.setdefault(zone, []).append(tag)
+    def occupants(self) -> dict[str, list[Occupant]]:
+        """Return the tags in each zone that is not empty, those first that have been there longest."""
+        inside: dict[str, list[Occupant]] = {}
+        sql = "SELECT item, tag, since_ns FROM states WHERE source = 'zone' ORDER BY item, since_ns, tag"
+        for zone, tag, since_ns in self.database.rows(sql) if self.database.is_made else ():
+            inside.setdefault(zone, []).append(Occupant(tag, since_ns))
         return inside
 
     def forget(self, source: str, items: Sequence[str]) -> None:

@@ -1,5 +1,6 @@
 """The page shows zones and events, live."""
 
+import re
 from collections.abc import Iterator
 from contextlib import ExitStack
 from threading import Event
@@ -7,6 +8,7 @@ from threading import Event
 import pytest
 from playwright.sync_api import Browser, expect
 
+from dropanchor_service.estimation.columns import State
 from service.dashboard.zone_place import ZonePlace, disc, served, square, zone_place
 from support.browser import WatchedPage, watched_page
 
@@ -54,6 +56,33 @@ def test_a_zone_is_dashed_until_a_tag_enters_and_its_list_counts_the_tags(chromi
         yard.put(square("yard", 1.0, 1.0, name="Court", colour="#112233"))
         expect(page.page.locator("#zone-list li", has_text="Court")).to_be_visible()
         page.wait_for(f"({STROKE})([0xd0, 0x20, 0x90]) === 0")
+
+
+def test_who_is_where_names_the_tags_in_each_zone_longest_first_and_can_be_printed(
+    chromium: Browser, yard: ZonePlace
+) -> None:
+    for tag in ("late", "early"):
+        yard.move(tag, x=-10.0, y=-10.0)
+    yard.go("early", 3.0, 3.0)
+    yard.go("late", 2.0, 2.0, state=State.COASTING)
+    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+        page.page.locator("#zone-list summary").click()
+        page.page.locator("#zone-list li", has_text="Yard").get_by_role("button", name="2 tags inside").click()
+        dialog = page.page.get_by_role("dialog", name="Who is where")
+        expect(dialog.locator("h3")).to_have_text(["Yard: 2", "Dock: 0", "In no zone: 1"])
+        expect(dialog.locator("section").nth(0).locator("li")).to_have_text(
+            [re.compile(r"^early [\d.]+ s$"), re.compile(r"^late [\d.]+ s · Coasting$")]
+        )
+        yard.go("late", -10.0, -10.0)
+        expect(dialog.locator("h3")).to_have_text(["Yard: 1", "Dock: 0", "In no zone: 2"])
+        page.page.emulate_media(media="print")
+        expect(page.page.locator("main")).to_be_hidden()
+        expect(dialog.get_by_text("early")).to_be_visible()
+        expect(dialog.get_by_role("button", name="Print")).to_be_hidden()
+        page.page.emulate_media(media="screen")
+        dialog.get_by_role("button", name="early").click()
+        expect(page.page.locator("#detail h2")).to_have_text("early")
+        assert page.errors == []
 
 
 def test_the_lists_of_the_present_are_hidden_while_the_page_shows_the_past(chromium: Browser, yard: ZonePlace) -> None:

@@ -76,7 +76,7 @@ def test_a_zone_and_a_rule_are_of_their_site_even_where_names_and_places_are_equ
         "b zone.enter cart",
         "c tags.too_close cart",
     ]
-    assert [store.occupancy() for store in company.stores] == [[("dock", 1)], [("dock", 1)], []]
+    assert [[*store.occupants()] for store in company.stores] == [["dock"], ["dock"], []]
     company.items[1].zones.remove("gate")  # the dock gets another column
     company.items[0].zones.put("dock", circle(radius_m=6.0))
     assert company.stay(3.0, near | {(1, "cart"): 100.0, (2, "lift"): 1.0}) == []

@@ -8,7 +8,7 @@ export class ZoneList {
   #shown = "";
 
   /** @param {HTMLElement} box @param {import("./zone_store.js").ZoneStore} store
-   * @param {{select: (id: string) => void, edit: (id: string) => void}} act */
+   * @param {{select: (id: string) => void, edit: (id: string) => void, count: (id: string) => void}} act */
   constructor(box, store, act) {
     this.store = store;
     this.act = act;
@@ -30,6 +30,7 @@ export class ZoneList {
       choose.setAttribute("aria-pressed", String(id === selected));
       const text = !current ? t("zones.outdated") : inside.has(id) ? t("zones.inside", { n: inside.get(id) }) : t("zones.empty");
       write(/** @type {HTMLElement} */ (tags), text);
+      /** @type {HTMLButtonElement} */ (tags).disabled = !current || !inside.has(id);
     });
   }
 
@@ -40,7 +41,7 @@ export class ZoneList {
     swatch.style.backgroundColor = colour;
     const choose = this.#button("choose", name || id, () => this.act.select(id));
     choose.prepend(swatch);
-    line.append(choose, document.createElement("span"));
+    line.append(choose, this.#button("text", "", () => this.act.count(id)));
     if (this.store.mayWrite) {
       const edit = this.#button("text", t("zones.edit"), () => this.act.edit(id));
       edit.setAttribute("aria-label", t("zones.edit_one", { zone: name || id }));

@@ -5,6 +5,7 @@ import { drawShape, drawZones } from "./draw_zones.js";
 import { ZoneEditor } from "./editor.js";
 import { EventList } from "./event_list.js";
 import { EventLog } from "./event_log.js";
+import { Headcount } from "./headcount.js";
 import { Handles } from "./handles.js";
 import { withCorner } from "./shape_edit.js";
 import { ZoneForm } from "./zone_form.js";
@@ -42,7 +43,9 @@ export class Zones {
     const box = byId("zone-list");
     this.handles = new Handles(byId("handles"), map, this.editor);
     this.events = new EventList(/** @type {HTMLDetailsElement} */ (byId("events")), this.log, (event) => this.pick(event));
-    this.list = new ZoneList(box, this.store, { select: (id) => this.select(id), edit: (id) => this.edit(id) });
+    const headcount = new Headcount(/** @type {HTMLDialogElement} */ (byId("headcount")), this.store, map.fleet, selectTag);
+    this.list = new ZoneList(box, this.store, { select: (id) => this.select(id), edit: (id) => this.edit(id), count: (id) => headcount.open(id) });
+    byId("count-all").addEventListener("click", () => headcount.open(null));
     new ZoneForm(/** @type {HTMLFormElement} */ (byId("zone-form")), this.editor, () => this.#addCorner());
     byId("new-polygon").addEventListener("click", () => this.#begin({ type: "polygon", points: [] }));
     byId("new-circle").addEventListener("click", () => this.#begin(this.#newCircle()));

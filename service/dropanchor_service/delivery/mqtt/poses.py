@@ -88,7 +88,7 @@ class PosesFeed:
         zones, tags = self._destination.zones, frozenset(self._destination.tags)
         found = self._live.events.occupants()
         return [
-            (zone, [tag for tag in found.get(zone.id, ()) if not tags or tag in tags])
+            (zone, sorted(tag for tag, _ in found.get(zone.id, ()) if not tags or tag in tags))
             for zone in self._live.zones.all.values()
             if not zones or zone.id in zones
         ]

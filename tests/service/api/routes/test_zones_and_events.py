@@ -144,8 +144,13 @@ def test_the_tags_in_each_known_zone_are_counted_from_entry_to_exit() -> None:
     ask(app, "PUT", "/api/v1/zones/dock", json=ZONE)
     inside, outside = StateValue(1, 5), None
     states = {StateKey("zone", zone, tag): inside for zone in ("dock", "deleted") for tag in ("a", "b")}
+    states[StateKey("zone", "dock", "b")] = StateValue(1, 3)
     parts.store.commit([], {**states, StateKey("rule", "dock", "c"): inside})
     assert ask(app, "GET", "/api/v1/zone-occupancy").json() == {"zones": [{"zone": "dock", "tags": 2}]}
+    assert ask(app, "GET", "/api/v1/zone-occupancy?names=true").json()["zones"][0]["inside"] == [
+        {"tag": "b", "since_ns": 3},
+        {"tag": "a", "since_ns": 5},
+    ]
     parts.store.commit([], {StateKey("zone", "dock", "a"): outside})
     assert ask(app, "GET", "/api/v1/zone-occupancy").json() == {"zones": [{"zone": "dock", "tags": 1}]}
     parts.store.commit([], {StateKey("zone", "dock", "b"): outside})
