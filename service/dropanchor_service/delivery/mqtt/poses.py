@@ -57,19 +57,21 @@ class PosesFeed:
             return f"the tags in zones cannot be read: {error}"
         columns = self._columns()
         self._follow_settings(columns)
-        others = list(self._others(inside))
+        others = list(self._others(inside))[:AT_ONCE]
         of_tags = _zones_of_tags(inside)
         due, marks = self._due(columns, of_tags)
-        due = due[: max(0, AT_ONCE - len(others))]
-        messages = [*others[:AT_ONCE], *(self._of_tag(columns, place, of_tags) for place in due.tolist())]
+        due = due[: AT_ONCE - len(others)]
+        messages = [*others, *(self._of_tag(columns, place, of_tags) for place in due.tolist())]
         self.pause_s = FULL_PAUSE_S if len(messages) >= AT_ONCE else min(PERIOD_S, self._destination.interval_s)
         outcomes = await self._broker.send(messages)
         if self._broker.connections != self._connections:
             self._forget()
-        is_sent = self._note(messages, outcomes)[len(messages) - len(due) :]
-        self._sent[columns.poses["row"][due[is_sent]]] = marks[due[is_sent]]
-        problems = [outcome.detail for outcome in outcomes if outcome.verdict is Verdict.UNAVAILABLE]
-        return next(iter([*problems, *self._refused.values()]), None)
+        is_sent = np.array([outcome.verdict is not Verdict.UNAVAILABLE for outcome in outcomes], bool)
+        self._hold([message for message, known in zip(others, is_sent.tolist(), strict=False) if known])
+        sent = due[is_sent[len(others) :]]
+        self._sent[columns.poses["row"][sent]] = marks[sent]
+        self.is_away = not is_sent.all()
+        return self._problem(messages, outcomes)
 
     async def clear(self) -> None:
         """Remove everything from the broker, if it answers soon."""
@@ -149,21 +151,22 @@ class PosesFeed:
         said = tag_state(columns, place, self._name_of(tag), of_tags.get(tag, ()))
         return _retained(self._topics.tag(tag), orjson.dumps(said))
 
-    def _note(self, messages: Sequence[Message], outcomes: Sequence[Outcome]) -> Array:
-        """Note what the broker holds now. Return whether each message need not be sent again."""
-        of_tags = set(self._topics_of(self._rows))
+    def _hold(self, others: Sequence[Message]) -> None:
+        """Note what the broker holds now in topics other than those of tags."""
+        for topic, payload, *_ in others:
+            self._held[topic] = payload
+            if not payload:
+                del self._held[topic]
+
+    def _problem(self, messages: Sequence[Message], outcomes: Sequence[Outcome]) -> str | None:
+        """Return why the broker did not take something. What it refuses is said until it takes it."""
         for message, outcome in zip(messages, outcomes, strict=True):
-            topic = message.topic
-            self._refused.pop(topic, None)
+            if outcome.verdict is Verdict.UNAVAILABLE:
+                return outcome.detail
+            self._refused.pop(message.topic, None)
             if outcome.verdict is Verdict.REFUSED:
-                self._refused[topic] = outcome.detail
-            if outcome.verdict is not Verdict.UNAVAILABLE and topic not in of_tags:
-                self._held[topic] = message.payload
-                if not message.payload:
-                    del self._held[topic]
-        is_sent = [outcome.verdict is not Verdict.UNAVAILABLE for outcome in outcomes]
-        self.is_away = not all(is_sent)
-        return np.array(is_sent, bool)
+                self._refused[message.topic] = outcome.detail
+        return next(iter(self._refused.values()), None)
 
     def _forget(self) -> None:
         """Let everything be sent again: a broker that was away may hold nothing any longer."""
