@@ -1,6 +1,7 @@
 """One program stamps the motion of a tag by one clock and its ranges by another one: the service aligns both."""
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 
 import numpy as np
 import pytest
@@ -25,7 +26,8 @@ Sent = tuple[int, Frame]
 """When a message arrives, and its frame."""
 
 
-def sent() -> list[Sent]:
+@cache  # all tests send the same
+def sent() -> Sequence[Sent]:
     """Return the messages of a tag that drives, both kinds in each."""
     messages = [(message.due_ns, decode_packed(message.payload)) for message in traffic(1, SECONDS, SEED, 0.1)]
     return [(due_ns + DELAYS[at % 3], frame) for at, (due_ns, frame) in enumerate(messages) if isinstance(frame, Frame)]

@@ -59,8 +59,9 @@ def test_a_name_a_colour_and_a_group_show_on_the_list_and_the_map_of_every_page(
         assert page.errors == other.errors == []
 
 
-def test_motion_mounting_angle_and_height_are_saved_and_undone(chromium: Browser, place: Place) -> None:
+def test_settings_are_saved_undone_and_merged_with_those_of_another_page(chromium: Browser, place: Place) -> None:
     place.move("cart", x=1.0, y=1.0)
+    store = place.bench.answers.site
     with watched_page(chromium, place.url) as page:
         form = open_settings(page, "cart")
         form.get_by_label("Moved by").select_option("carried")
@@ -69,25 +70,24 @@ def test_motion_mounting_angle_and_height_are_saved_and_undone(chromium: Browser
         form.get_by_role("button", name="Save settings").click()
         outcome = page.page.locator("#outcome")
         expect(outcome).to_contain_text("Settings of cart changed.")
-        given = place.bench.answers.site.tag_settings("cart")
-        assert given == TagSettings(motion="carried", mount_angle_rad=math.pi / 2, height_m=1.2)
+        carried = TagSettings(motion="carried", mount_angle_rad=math.pi / 2, height_m=1.2)
+        assert store.tag_settings("cart") == carried
         outcome.get_by_role("button", name="Undo").click()
         expect(outcome).to_contain_text("Undone")
-        assert place.bench.answers.site.tag_settings("cart") == TagSettings()
+        assert store.tag_settings("cart") == TagSettings()
         expect(form.get_by_label("Height")).to_have_value("")
 
-
-def test_a_height_of_0_is_told_and_an_empty_one_is_not(chromium: Browser, place: Place) -> None:
-    place.move("cart", x=1.0, y=1.0)
-    store = place.bench.answers.site
-    with watched_page(chromium, place.url) as page:
-        form = open_settings(page, "cart")
-        expect(form.get_by_label("Height")).to_have_value("")
         for typed, told in (("0", TagSettings(height_told=True)), ("", TagSettings())):
             form.get_by_label("Height").fill(typed)
             form.get_by_role("button", name="Save settings").click()
             wait_until(lambda told=told: store.tag_settings("cart") == told)  # type: ignore[misc]
             expect(form.get_by_label("Height")).to_have_value(typed)
+
+        form.get_by_label("Name").fill("Mine")
+        store.set_tag("cart", TagSettings(name="Theirs", height_m=2.0))
+        form.get_by_role("button", name="Save settings").click()
+        outcome.get_by_role("button", name="Keep mine").click()
+        wait_until(lambda: store.tag_settings("cart") == TagSettings(name="Mine", height_m=2.0))
 
 
 @pytest.mark.parametrize(("height", "told"), [("2", TagSettings(height_m=2.0)), ("", TagSettings())])
@@ -110,20 +110,6 @@ def test_what_is_typed_while_a_change_is_saved_stays_and_is_saved_after_it(
         expect(form.get_by_label("Name")).to_have_attribute("data-shown", "Forklift 1")
         assert store.tag_settings("cart") == told.model_copy(update={"name": "Forklift 1"})
         assert page.errors == []
-
-
-def test_settings_that_another_page_changed_meanwhile_are_merged_only_when_asked(
-    chromium: Browser, place: Place
-) -> None:
-    place.move("cart", x=1.0, y=1.0)
-    with watched_page(chromium, place.url) as page:
-        form = open_settings(page, "cart")
-        form.get_by_label("Name").fill("Mine")
-        place.bench.answers.site.set_tag("cart", TagSettings(name="Theirs", height_m=2.0))
-        form.get_by_role("button", name="Save settings").click()
-        outcome = page.page.locator("#outcome")
-        outcome.get_by_role("button", name="Keep mine").click()
-        wait_until(lambda: place.bench.answers.site.tag_settings("cart") == TagSettings(name="Mine", height_m=2.0))
 
 
 def test_the_tag_is_here_sets_its_start_by_a_drag_or_by_numbers(chromium: Browser, place: Place) -> None:
