@@ -66,8 +66,8 @@ NOT_RUN = {
     "-H 'Content-Type: application/json' -d '{": "needs a mail server: tests/service/delivery",
     "install-a-release.md: docker build -f deploy/Dockerfile -t dropanchor .": "tests/deploy/test_dockerfile.py",
     'install-a-release.md: pipx install --force --pip-args="--constraint $PWD/constraints.txt --find-links $PWD" '
-    "'dropanchor-service[maps]'": "tests/deploy/test_upgrade.py",
-    "install-a-release.md: python3 -m venv ~/dropanchor": "tests/deploy/test_upgrade.py",
+    "'dropanchor-service[maps]'": "tests/deploy/test_release.py",
+    "install-a-release.md: python3 -m venv ~/dropanchor": "tests/deploy/test_release.py",
     "install-a-release.md: sha256sum --check SHA256SUMS": "tests/deploy/test_release.py",
     "react-to-events.md: echo whsec_$(openssl rand -base64 32)": "the secret is left to the reader",
     "record-and-replay.md: dropanchor record start": "needs the port 8080: tests/e2e/test_recording.py",

@@ -169,7 +169,7 @@ def batched(messages: list[Sent], seconds: float) -> list[Sent]:
     ids=["a backlog", "one range a second", "batches of 2 s", "a message for each kind"],
 )
 def test_no_way_to_deliver_makes_equal_clocks_look_apart(arranged: Callable[[list[Sent]], list[Sent]]) -> None:
-    service = Service().take(arranged(sent()))
+    service = Service().take(arranged(list(sent())))
     assert service.moved_s() == 0.0
 
 
