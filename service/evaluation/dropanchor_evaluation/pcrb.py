@@ -1,18 +1,17 @@
 """The posterior Cramér-Rao bound of the position (Tichavský, Muravchik and Nehorai 1998) on the true path of a run.
 
 With additive Gaussian noise, the recursion J' = (Q + F J⁻¹ Fᵀ)⁻¹ + Hᵀ R⁻¹ H is that of a Kalman filter's covariance
-with the Jacobians at the truth. The code uses the covariance form, which allows a singular Q.
+with the Jacobians at the truth, in the covariance form, which allows a singular Q: that of `bounds/recursion`.
 """
 
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numba import njit
 
+from dropanchor_evaluation.bounds.linear import LinearModel
 from dropanchor_service.estimation.columns import Array
 
-X, Y, THETA, V, GYRO_BIAS, ACC_BIAS, LEAK = range(7)
 AT_REST_MPS = 1e-6
 
 
@@ -62,22 +61,30 @@ def position_bound(path: Path, sensors: Sensors, information: Information) -> Ar
     """
     s = sensors
     accelerometer = information == "with accelerometer"
-    acc = (s.acceleration_bias, s.leak) if accelerometer else (0.0, 0.0)
-    start = np.array([s.start, s.start, s.start_heading, s.start_speed, s.gyro_bias, *acc]) ** 2
     dt = (path.t[-1] - path.t[0]) / (len(path.t) - 1)
-    decay = np.exp(-dt / s.leak_tau_s)
-    q_leak = s.leak**2 * (1 - decay**2) if accelerometer else 0.0
-    q_speed = (
-        np.full(len(path.t), (s.acceleration * dt) ** 2)
-        if accelerometer
-        else _jump_power(path.v, spread=information == "range+heading, random-walk speed")
-    )
-    rest = np.abs(path.v) < AT_REST_MPS if accelerometer else np.zeros(len(path.t), bool)
-    R = np.array([s.range, s.heading, s.zero_speed]) ** 2
-    q = np.array([(s.gyro * dt) ** 2, q_leak])
-    path_columns = np.column_stack([path.x, path.y, path.course, path.v])
-    bound: Array = _recursion(path_columns, path.ranged, rest, np.diag(start), q, q_speed, R, dt, decay)
-    return bound
+    spread = information == "range+heading, random-walk speed"
+    m = LinearModel(len(path.t))
+    m.state("x", s.start)
+    m.state("y", s.start)
+    m.state("heading", s.start_heading, (s.gyro * dt) ** 2)
+    m.state("speed", s.start_speed, (s.acceleration * dt) ** 2 if accelerometer else _jump_power(path.v, spread))
+    m.state("gyro bias", s.gyro_bias)
+    m.move("heading", "gyro bias", -dt)
+    c, w, v = (np.roll(column, 1) * dt for column in (np.cos(path.course), np.sin(path.course), path.v))
+    m.move("x", "heading", -v * w / dt)
+    m.move("x", "speed", c)
+    m.move("y", "heading", v * c / dt)
+    m.move("y", "speed", w)
+    m.observe(s.heading, {"heading": 1.0})
+    r = np.where(path.ranged, np.hypot(path.x, path.y), 1.0)
+    m.observe(s.range, {"x": path.x / r, "y": path.y / r}, path.ranged)
+    if accelerometer:
+        m.state("acceleration bias", s.acceleration_bias)
+        m.move("speed", "acceleration bias", -dt)
+        m.gauss_markov("leak", s.leak, s.leak_tau_s, dt)
+        m.move("speed", "leak", -dt)
+        m.observe(s.zero_speed, {"speed": 1.0}, np.abs(path.v) < AT_REST_MPS)
+    return m.bound(draws=0, seed=0).position
 
 
 def _jump_power(v: Array, spread: bool) -> Array:
@@ -88,44 +95,3 @@ def _jump_power(v: Array, spread: bool) -> Array:
     for first, last in edges.reshape(-1, 2):
         power[first:last] += (v[last - 1] - v[max(first - 1, 0)]) ** 2 / (last - first)
     return np.full(len(v), power.mean()) if spread else power
-
-
-@njit(cache=True)
-def _recursion(
-    path: Array, ranged: Array, rest: Array, P: Array, q: Array, q_speed: Array, R: Array, dt: float, decay: float
-) -> Array:
-    bound = np.empty(len(path))
-    F = np.eye(7)
-    F[THETA, GYRO_BIAS] = -dt
-    F[V, ACC_BIAS] = F[V, LEAK] = -dt
-    F[LEAK, LEAK] = decay
-    for i in range(len(path)):
-        if i > 0:
-            c, s, v = np.cos(path[i - 1, 2]), np.sin(path[i - 1, 2]), path[i - 1, 3]
-            F[X, THETA], F[X, V] = -v * s * dt, c * dt
-            F[Y, THETA], F[Y, V] = v * c * dt, s * dt
-            P = F @ P @ F.T
-            P[THETA, THETA] += q[0]
-            P[V, V] += q_speed[i]
-            P[LEAK, LEAK] += q[1]
-        h = np.zeros(7)
-        h[THETA] = 1.0
-        P = _posterior(P, h, R[1])
-        if ranged[i]:
-            r = np.hypot(path[i, 0], path[i, 1])
-            h = np.zeros(7)
-            h[X], h[Y] = path[i, 0] / r, path[i, 1] / r
-            P = _posterior(P, h, R[0])
-        if rest[i]:
-            h = np.zeros(7)
-            h[V] = 1.0
-            P = _posterior(P, h, R[2])
-        bound[i] = P[X, X] + P[Y, Y]
-    return bound
-
-
-@njit(cache=True)
-def _posterior(P: Array, h: Array, R: float) -> Array:
-    K = P @ h / (h @ P @ h + R)
-    A = np.eye(len(h)) - np.outer(K, h)
-    return A @ P @ A.T + R * np.outer(K, K)

@@ -1,6 +1,6 @@
 """The recursion of the posterior Cramér-Rao bound for a sparse linear model (Tichavský, Muravchik and Nehorai 1998).
 
-As in `pcrb`, it is that of a Kalman filter's covariance with the Jacobians at the truth. Measurements are scalar and
+It is that of a Kalman filter's covariance with the Jacobians at the truth. Measurements are scalar and
 independent. The same gains carry the errors of estimators whose noise is drawn: an efficient estimator has such errors.
 """
 
