@@ -13,6 +13,7 @@ import { NetworkList } from "./network_list.js";
 import { RuleList } from "./rule_list.js";
 import { SecretField, newSecret } from "./secret_field.js";
 import { stuckIn } from "./words.js";
+import { partOf } from "../page/parts.js";
 
 const COMMON = { enabled: true, types: [], zones: [], tags: [] };
 /** @type {Record<string, Record<string, any>>} */
@@ -45,9 +46,9 @@ export class Alerts {
     const { store } = this;
     this.destinationEditor = new ItemEditor("destination", store.destinations, () => store.states.map(({ destination }) => destination), changes);
     this.ruleEditor = new ItemEditor("rule", store.rules, () => store.allRules, changes);
-    this.destinations = new DestinationList(this.#part("destinations"), store, { edit: (id) => panels.open("destination", () => this.destinationEditor.open(id)), confirm: this.confirm, isLeaving: (id) => changes.isLeaving(store.destinations.path(id)) });
-    this.rules = new RuleList(this.#part("rules"), store, () => zones.store.zones, { edit: (id) => panels.open("rule", () => this.ruleEditor.open(id)), editZone: (id) => zones.edit(id) });
-    this.networks = new NetworkList(this.#part("networks"), store);
+    this.destinations = new DestinationList(partOf(this.box, "destinations"), store, { edit: (id) => panels.open("destination", () => this.destinationEditor.open(id)), confirm: this.confirm, isLeaving: (id) => changes.isLeaving(store.destinations.path(id)) });
+    this.rules = new RuleList(partOf(this.box, "rules"), store, () => zones.store.zones, { edit: (id) => panels.open("rule", () => this.ruleEditor.open(id)), editZone: (id) => zones.edit(id) });
+    this.networks = new NetworkList(partOf(this.box, "networks"), store);
     this.#addForms();
     this.#addPanel("destination", this.destinationEditor, (type) => ({ ...NEW_DESTINATIONS[type], ...(type === "webhook" ? { secret: newSecret() } : {}) }));
     this.#addPanel("rule", this.ruleEditor, (type) => NEW_RULES[type]);
@@ -58,8 +59,8 @@ export class Alerts {
 
   #addForms() {
     const { store } = this;
-    listLanguages(/** @type {HTMLSelectElement} */ (this.#part("language")));
-    const form = /** @type {HTMLFormElement} */ (this.#part("destination-form"));
+    listLanguages(/** @type {HTMLSelectElement} */ (partOf(this.box, "language")));
+    const form = /** @type {HTMLFormElement} */ (partOf(this.box, "destination-form"));
     new ItemForm(form, this.destinationEditor, {
       title: ({ id, type }, isNew) => (isNew ? t(`alerts.new_${type}`) : t("destination.title", { id })),
       mayDelete: () => store.isAdmin,
@@ -67,23 +68,18 @@ export class Alerts {
     });
     new SecretField(form, this.destinationEditor);
     this.networks.offerIn(form, this.destinationEditor);
-    new ItemForm(/** @type {HTMLFormElement} */ (this.#part("rule-form")), this.ruleEditor, {
+    new ItemForm(/** @type {HTMLFormElement} */ (partOf(this.box, "rule-form")), this.ruleEditor, {
       title: ({ type }, isNew) => (isNew ? t("rule.new", { rule: t(`rule.${type}`) }) : t(`rule.${type}`)),
       mayDelete: () => store.isAdmin,
       ask: () => this.confirm(t("rule.question"), t("rule.delete")),
     });
   }
 
-  /** @param {string} name @returns {HTMLElement} */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.box.querySelector(`[data-part="${name}"]`));
-  }
-
   /** Register a form, and the buttons that begin something new in it. @param {"destination" | "rule"} name @param {ItemEditor} editor
    * @param {(type: string) => Record<string, any>} fresh */
   #addPanel(name, editor, fresh) {
     this.panels.add(name, { isOpen: () => editor.item !== null, isUnsaved: () => editor.isUnsaved, saving: () => editor.saving.now, leave: () => editor.close() });
-    for (const one of /** @type {NodeListOf<HTMLElement>} */ (this.#part(`new-${name}`).querySelectorAll("button"))) {
+    for (const one of /** @type {NodeListOf<HTMLElement>} */ (partOf(this.box, `new-${name}`).querySelectorAll("button"))) {
       const type = one.dataset.type ?? "";
       one.addEventListener("click", () => this.#mayMake(type) && this.panels.open(name, () => editor.begin(fresh(type))));
     }
@@ -93,7 +89,7 @@ export class Alerts {
    * @param {string} type */
   #mayMake(type) {
     const why = this.store.unavailable[type] ?? "";
-    const lacking = this.#part("lacking");
+    const lacking = partOf(this.box, "lacking");
     lacking.textContent = begun(said(why, this.store.unavailable_phrases[type]));
     lacking.hidden = why === "";
     return why === "";
@@ -102,15 +98,15 @@ export class Alerts {
   #update() {
     const { store } = this;
     const stuck = stuckIn(store.states);
-    const summary = this.#part("summary");
-    summary.hidden = this.#part("who").hidden = shareToken !== null;
+    const summary = partOf(this.box, "summary");
+    summary.hidden = partOf(this.box, "who").hidden = shareToken !== null;
     summary.textContent = stuck > 0 ? t("alerts.stuck", { n: stuck }) : store.states.length === 0 ? t("alerts.nobody_short") : t("alerts.destination_count", { n: store.states.length });
     summary.classList.toggle("failing", stuck > 0);
     const editing = this.destinationEditor.item !== null || this.ruleEditor.item !== null;
-    this.#part("lists").hidden = editing;
-    this.#part("new-destination").hidden = !store.isAdmin;
-    this.#part("new-rule").hidden = !store.mayWrite;
-    this.#part("no-destination").hidden = shareToken !== null || store.states.length > 0;
+    partOf(this.box, "lists").hidden = editing;
+    partOf(this.box, "new-destination").hidden = !store.isAdmin;
+    partOf(this.box, "new-rule").hidden = !store.mayWrite;
+    partOf(this.box, "no-destination").hidden = shareToken !== null || store.states.length > 0;
     this.destinations.update();
     this.rules.update();
     this.networks.update();

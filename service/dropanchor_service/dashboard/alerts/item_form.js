@@ -1,6 +1,7 @@
 /** The form of a destination or a rule. Fields with `data-for` belong to some types only. */
 
 import { readMeasure, writeMeasure } from "../data/units.js";
+import { partOf } from "../page/parts.js";
 
 /** @typedef {import("../data/items.js").Item} Item @typedef {HTMLInputElement | HTMLSelectElement | HTMLTextAreaElement} Field */
 
@@ -20,8 +21,8 @@ export class ItemForm {
     });
     form.addEventListener("reset", () => editor.close());
     form.addEventListener("input", () => (editor.isUnsaved = true));
-    this.#part("newer").addEventListener("click", () => editor.item && editor.open(editor.item.id));
-    this.#part("delete").addEventListener("click", async () => (await act.ask()) && editor.remove());
+    partOf(this.form, "newer").addEventListener("click", () => editor.item && editor.open(editor.item.id));
+    partOf(this.form, "delete").addEventListener("click", async () => (await act.ask()) && editor.remove());
     editor.addEventListener("change", () => this.#update());
   }
 
@@ -29,9 +30,9 @@ export class ItemForm {
     const { item, isNew, problem, conflict } = this.editor;
     this.form.hidden = item === null;
     this.#write("problem", problem);
-    this.#part("newer").hidden = !conflict;
-    this.#part("delete").hidden = isNew || !this.act.mayDelete();
-    if (problem !== "") this.#part("problem").scrollIntoView({ block: "nearest" });
+    partOf(this.form, "newer").hidden = !conflict;
+    partOf(this.form, "delete").hidden = isNew || !this.act.mayDelete();
+    if (problem !== "") partOf(this.form, "problem").scrollIntoView({ block: "nearest" });
     if (item !== null && problem === "" && item !== this.#shown) this.#show(item, isNew);
     this.#shown = item;
   }
@@ -69,14 +70,9 @@ export class ItemForm {
     return this.#fields().find((field) => field.dataset.as === "id" || field.name === "name")?.value ?? "";
   }
 
-  /** @param {string} name @returns {HTMLElement} */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.form.querySelector(`[data-part="${name}"]`));
-  }
-
   /** @param {string} name @param {string} text */
   #write(name, text) {
-    const part = this.#part(name);
+    const part = partOf(this.form, name);
     part.textContent = text;
     part.hidden = text === "";
   }

@@ -3,13 +3,14 @@
 import { t } from "../i18n/language.js";
 import { refusalInForm } from "../i18n/said.js";
 import { button, element, keepLines } from "./lines.js";
+import { partOf } from "../page/parts.js";
 
 export class NetworkList {
   /** @param {HTMLElement} box @param {import("./alert_store.js").AlertStore} store */
   constructor(box, store) {
     this.box = box;
     this.store = store;
-    this.form = /** @type {HTMLFormElement} */ (part(box, "allow-form"));
+    this.form = /** @type {HTMLFormElement} */ (partOf(box, "allow-form"));
     this.form.addEventListener("submit", async (event) => {
       event.preventDefault();
       const field = /** @type {HTMLInputElement} */ (this.form.elements.namedItem("network"));
@@ -21,21 +22,21 @@ export class NetworkList {
     const { networks, isAdmin } = this.store;
     this.box.hidden = networks.length === 0 && !isAdmin;
     this.form.hidden = !isAdmin;
-    keepLines(part(this.box, "list"), networks.map((one) => ({ key: JSON.stringify([one, isAdmin]), make: () => this.#line(one) })));
+    keepLines(partOf(this.box, "list"), networks.map((one) => ({ key: JSON.stringify([one, isAdmin]), make: () => this.#line(one) })));
   }
 
   /** Offer the network that a destination lacks, where it is refused.
    * @param {HTMLFormElement} form @param {import("./item_editor.js").ItemEditor} editor */
   offerIn(form, editor) {
-    const allow = /** @type {HTMLButtonElement} */ (part(form, "allow"));
+    const allow = /** @type {HTMLButtonElement} */ (partOf(form, "allow"));
     editor.addEventListener("change", () => {
-      part(form, "mend").hidden = editor.network === null || !this.store.isAdmin;
+      partOf(form, "mend").hidden = editor.network === null || !this.store.isAdmin;
       allow.textContent = t("networks.allow_one", { network: editor.network ?? "" });
     });
     allow.addEventListener("click", async () => {
       const problem = await this.#refusalOf(/** @type {string} */ (editor.network), "PUT");
       if (problem === "") form.requestSubmit();
-      else part(form, "problem").textContent = problem;
+      else partOf(form, "problem").textContent = problem;
     });
   }
 
@@ -51,8 +52,8 @@ export class NetworkList {
   /** Return whether the service did it; if not, say why. @param {string} network @param {"PUT" | "DELETE"} method */
   async #attempt(network, method) {
     const problem = await this.#refusalOf(network, method);
-    part(this.form, "problem").textContent = problem;
-    part(this.form, "problem").hidden = problem === "";
+    partOf(this.form, "problem").textContent = problem;
+    partOf(this.form, "problem").hidden = problem === "";
     return problem === "";
   }
 
@@ -66,6 +67,3 @@ export class NetworkList {
     }
   }
 }
-
-/** @param {HTMLElement} box @param {string} name @returns {HTMLElement} */
-const part = (box, name) => /** @type {HTMLElement} */ (box.querySelector(`[data-part="${name}"]`));

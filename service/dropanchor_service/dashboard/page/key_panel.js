@@ -5,6 +5,7 @@ import { api, getJson } from "../data/connection.js";
 import { t, timeText } from "../i18n/language.js";
 import { refusalInForm } from "../i18n/said.js";
 import { revocableLine } from "./revocable_line.js";
+import { fieldOf, partOf } from "./parts.js";
 
 /** @typedef {{id: string, name: string, scope: string | null, tag: string | null, expires_ns: number | null}} Key */
 
@@ -17,13 +18,13 @@ export class KeyPanel {
       event.preventDefault();
       this.#attempt(() => this.#create());
     });
-    this.#field("may").addEventListener("change", () => this.#askForTag());
+    fieldOf(this.form, "may").addEventListener("change", () => this.#askForTag());
   }
 
   /** Show the keys. Without the right to see them, or anything to protect, show nothing. */
   async open() {
-    this.#part("created").hidden = true;
-    this.#part("secret").textContent = "";
+    partOf(this.box, "created").hidden = true;
+    partOf(this.box, "secret").textContent = "";
     this.#say("");
     await this.#refresh();
   }
@@ -32,8 +33,8 @@ export class KeyPanel {
     const { available, keys } = await getJson(api("keys")).catch(() => ({ available: false, keys: [] }));
     this.box.hidden = !available && keys.length === 0;
     this.form.hidden = !available;
-    this.#part("by-command").hidden = available;
-    this.#part("list").replaceChildren(...keys.map((/** @type {Key} */ key) => this.#line(key, available)));
+    partOf(this.box, "by-command").hidden = available;
+    partOf(this.box, "list").replaceChildren(...keys.map((/** @type {Key} */ key) => this.#line(key, available)));
   }
 
   async #create() {
@@ -45,17 +46,17 @@ export class KeyPanel {
     this.form.reset();
     this.#askForTag();
     this.#say("");
-    this.#part("created-what").textContent = t(tag === null ? "access.created" : "access.created_tag", { tag: tag ?? "" });
-    this.#part("secret").textContent = tag === null ? secret : linkOf(tag, secret);
-    this.#part("created").hidden = false;
+    partOf(this.box, "created-what").textContent = t(tag === null ? "access.created" : "access.created_tag", { tag: tag ?? "" });
+    partOf(this.box, "secret").textContent = tag === null ? secret : linkOf(tag, secret);
+    partOf(this.box, "created").hidden = false;
     await this.#refresh();
-    this.#part("created").scrollIntoView({ block: "nearest" });
+    partOf(this.box, "created").scrollIntoView({ block: "nearest" });
   }
 
   #askForTag() {
-    const isTag = this.#field("may").value === "tag";
-    this.#part("tag").hidden = !isTag;
-    this.#field("tag").disabled = !isTag;
+    const isTag = fieldOf(this.form, "may").value === "tag";
+    partOf(this.box, "tag").hidden = !isTag;
+    fieldOf(this.form, "tag").disabled = !isTag;
   }
 
   /** @param {Key} key @param {boolean} isRevocable */
@@ -65,7 +66,7 @@ export class KeyPanel {
     if (!isRevocable) return Object.assign(document.createElement("li"), { textContent: text });
     return revocableLine(text, name, () => this.#attempt(async () => {
       await send(api(`keys/${id}`), "DELETE", null);
-      this.#part("created").hidden = true;
+      partOf(this.box, "created").hidden = true;
       await this.#refresh();
     }));
   }
@@ -81,18 +82,8 @@ export class KeyPanel {
 
   /** @param {string} problem */
   #say(problem) {
-    this.#part("problem").textContent = problem;
-    this.#part("problem").hidden = problem === "";
-  }
-
-  /** @param {string} name @returns {HTMLInputElement | HTMLSelectElement} */
-  #field(name) {
-    return /** @type {HTMLInputElement | HTMLSelectElement} */ (this.form.elements.namedItem(name));
-  }
-
-  /** @param {string} name */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.box.querySelector(`[data-part="${name}"]`));
+    partOf(this.box, "problem").textContent = problem;
+    partOf(this.box, "problem").hidden = problem === "";
   }
 }
 

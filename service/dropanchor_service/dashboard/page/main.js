@@ -42,13 +42,11 @@ import { installTheme } from "./theme.js";
 import { Trails } from "../data/trails.js";
 import { ViewAddress } from "./view_address.js";
 import { Zones } from "../zones/zones.js";
+import { byId } from "./parts.js";
 
 const PANELS_MS = 250;
 
 translate(document);
-
-/** @template {HTMLElement} T @param {string} id @returns {T} */
-const byId = (id) => /** @type {T} */ (document.getElementById(id));
 
 const panels = new Panels(() => confirmed(/** @type {HTMLDialogElement} */ (byId("confirm")), t("panels.question"), t("panels.discard")));
 const fleet = new Fleet();

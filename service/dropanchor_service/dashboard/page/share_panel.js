@@ -6,6 +6,7 @@ import { api, getJson } from "../data/connection.js";
 import { t, timeText } from "../i18n/language.js";
 import { refusal } from "../i18n/said.js";
 import { revocableLine } from "./revocable_line.js";
+import { partOf } from "./parts.js";
 
 /** @typedef {{id: string, name: string, expires_ns: number, tag: string | null, group: string | null}} Share */
 
@@ -23,7 +24,7 @@ export class SharePanel {
 
   /** Show the links, and offer what the page shows now. Without the right to share, or anything to protect, show nothing. */
   async open() {
-    this.#part("created").hidden = true;
+    partOf(this.box, "created").hidden = true;
     this.#say("");
     this.#offer();
     await this.#refresh();
@@ -57,13 +58,13 @@ export class SharePanel {
     const { path } = await (await send(api("shares"), "POST", body)).json();
     await this.#refresh();
     this.#say("");
-    this.#part("link").textContent = new URL(path.replace(/^[^?#]*/, ""), new URL(".", document.baseURI)).href;
-    this.#part("created").hidden = false;
+    partOf(this.box, "link").textContent = new URL(path.replace(/^[^?#]*/, ""), new URL(".", document.baseURI)).href;
+    partOf(this.box, "created").hidden = false;
   }
 
   /** @param {Share[]} shares */
   #list(shares) {
-    this.#part("list").replaceChildren(...shares.map((share) => this.#line(share)));
+    partOf(this.box, "list").replaceChildren(...shares.map((share) => this.#line(share)));
   }
 
   /** @param {Share} share */
@@ -73,7 +74,7 @@ export class SharePanel {
     const text = t(expires_ns / 1e6 < Date.now() ? "share.expired" : "share.until", { what, time });
     return revocableLine(text, what, () => this.#attempt(async () => {
       await send(api(`shares/${id}`), "DELETE", null);
-      this.#part("created").hidden = true;
+      partOf(this.box, "created").hidden = true;
       await this.#refresh();
     }));
   }
@@ -89,12 +90,7 @@ export class SharePanel {
 
   /** @param {string} problem */
   #say(problem) {
-    this.#part("problem").textContent = problem;
-    this.#part("problem").hidden = problem === "";
-  }
-
-  /** @param {string} name */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.box.querySelector(`[data-part="${name}"]`));
+    partOf(this.box, "problem").textContent = problem;
+    partOf(this.box, "problem").hidden = problem === "";
   }
 }

@@ -5,6 +5,7 @@ import { saveFile } from "../data/save_file.js";
 import { t, timeText } from "../i18n/language.js";
 import { refusal } from "../i18n/said.js";
 import { ChangedMeanwhileError } from "../data/access.js";
+import { partOf } from "./parts.js";
 
 /** @typedef {import("../data/trail.js").Entry} Entry @typedef {import("../data/trail.js").Setting} Setting @typedef {import("../data/trail.js").Held} Held */
 
@@ -19,9 +20,9 @@ export class TrailPanel {
   constructor(dialog, changes) {
     this.dialog = dialog;
     this.changes = changes;
-    this.#part("more").addEventListener("click", () => this.#attempt(() => this.#readMore()));
+    partOf(this.dialog, "more").addEventListener("click", () => this.#attempt(() => this.#readMore()));
     for (const format of /** @type {const} */ (["csv", "jsonl"])) {
-      this.#part(format).addEventListener("click", () => this.#attempt(() => saveFile(trailUrl(format), `changes.${format}`)));
+      partOf(this.dialog, format).addEventListener("click", () => this.#attempt(() => saveFile(trailUrl(format), `changes.${format}`)));
     }
   }
 
@@ -32,9 +33,9 @@ export class TrailPanel {
 
   async #refresh() {
     const settings = await readSettings();
-    this.#part("values").replaceChildren(...settings.map((setting) => this.#setting(setting)));
-    this.#part("no-values").hidden = settings.length > 0;
-    this.#part("entries").replaceChildren();
+    partOf(this.dialog, "values").replaceChildren(...settings.map((setting) => this.#setting(setting)));
+    partOf(this.dialog, "no-values").hidden = settings.length > 0;
+    partOf(this.dialog, "entries").replaceChildren();
     this.#next = null;
     await this.#readMore();
   }
@@ -42,9 +43,9 @@ export class TrailPanel {
   async #readMore() {
     const { entries, next } = await readEntries(this.#next);
     this.#next = next;
-    this.#part("entries").append(...entries.map((entry) => this.#entry(entry)));
-    this.#part("more").hidden = next === null;
-    this.#part("no-entries").hidden = this.#part("entries").childElementCount > 0;
+    partOf(this.dialog, "entries").append(...entries.map((entry) => this.#entry(entry)));
+    partOf(this.dialog, "more").hidden = next === null;
+    partOf(this.dialog, "no-entries").hidden = partOf(this.dialog, "entries").childElementCount > 0;
   }
 
   /** @param {Setting} setting */
@@ -81,7 +82,7 @@ export class TrailPanel {
     button.addEventListener("click", () => this.#attempt(async () => {
       await act();
       await this.#refresh();
-      this.#part("values").focus();
+      partOf(this.dialog, "values").focus();
     }));
     line.append(button);
     return line;
@@ -95,13 +96,8 @@ export class TrailPanel {
     } catch (error) {
       problem = error instanceof NewerError || error instanceof ChangedMeanwhileError ? t("trail.newer") : refusal(error);
     }
-    this.#part("problem").textContent = problem;
-    this.#part("problem").hidden = problem === "";
-  }
-
-  /** @param {string} name */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.dialog.querySelector(`[data-part="${name}"]`));
+    partOf(this.dialog, "problem").textContent = problem;
+    partOf(this.dialog, "problem").hidden = problem === "";
   }
 }
 

@@ -4,6 +4,7 @@ import { UNKNOWN, half, length, percent, place, speed } from "../data/format.js"
 import { t } from "../i18n/language.js";
 import { hintOf } from "./hint.js";
 import { units } from "../data/units.js";
+import { write } from "../page/parts.js";
 
 /** @typedef {{name: string, title: string, text: (row: number) => string}} Column */
 
@@ -29,7 +30,7 @@ export class Comparison {
       head.replaceChildren(lineOf(columns.map(({ title }) => title), "col"));
       body.replaceChildren(...lines.map((texts) => lineOf(texts, "row")));
     }
-    lines.forEach((texts, at) => texts.forEach((text, place) => put(body.rows[at].cells[place], text))); // the cells stay, and so does what is marked in them
+    lines.forEach((texts, at) => texts.forEach((text, place) => write(body.rows[at].cells[place], text))); // the cells stay, and so does what is marked in them
   }
 
   /** @returns {Column[]} */
@@ -57,9 +58,4 @@ function lineOf(texts, scope) {
     return Object.assign(document.createElement(isHead ? "th" : "td"), { textContent, ...(isHead ? { scope } : {}) });
   }));
   return line;
-}
-
-/** @param {HTMLElement} element @param {string} text */
-function put(element, text) {
-  if (element.textContent !== text) element.textContent = text;
 }

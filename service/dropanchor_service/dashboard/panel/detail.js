@@ -13,6 +13,7 @@ import { applyNorth, isNorthOffered } from "./north.js";
 import { Plots } from "./plots.js";
 import { showUncertainty } from "./uncertainty.js";
 import { symbol } from "../map/symbols.js";
+import { partOf, write } from "../page/parts.js";
 
 /** @typedef {import("../data/fleet.js").Fleet} Fleet */
 
@@ -34,12 +35,12 @@ export class Detail {
     this.roster = roster;
     this.choice = choice;
     this.evidence = evidence;
-    this.plots = new Plots(this.#part("plots"));
-    this.heights = new HeightPlot(this.#part("heights"));
-    this.follow = /** @type {HTMLButtonElement} */ (this.#part("follow"));
+    this.plots = new Plots(partOf(this.panel, "plots"));
+    this.heights = new HeightPlot(partOf(this.panel, "heights"));
+    this.follow = /** @type {HTMLButtonElement} */ (partOf(this.panel, "follow"));
     this.follow.addEventListener("click", () => (choice.follow = !choice.follow));
-    this.#part("apply-north").addEventListener("click", () => this.changes && applyNorth(this.changes));
-    this.#part("close").addEventListener("click", () => this.leave());
+    partOf(this.panel, "apply-north").addEventListener("click", () => this.changes && applyNorth(this.changes));
+    partOf(this.panel, "close").addEventListener("click", () => this.leave());
     choice.addEventListener("change", () => this.update());
     evidence.addEventListener("change", () => this.#explain());
     this.update();
@@ -48,8 +49,8 @@ export class Detail {
   /** @param {number} rad */
   set rotation_rad(rad) {
     this.#rotation_rad = rad;
-    put(this.#part("n-x"), t(rad === 0 ? "figure.x_east" : "table.x"));
-    put(this.#part("n-y"), t(rad === 0 ? "figure.y_north" : "table.y"));
+    write(partOf(this.panel, "n-x"), t(rad === 0 ? "figure.x_east" : "table.x"));
+    write(partOf(this.panel, "n-y"), t(rad === 0 ? "figure.y_north" : "table.y"));
   }
 
   update() {
@@ -72,16 +73,11 @@ export class Detail {
     const row = this.fleet.row(this.choice.selected);
     if (row < 0) return;
     this.plots.update(this.#explanation);
-    showUncertainty(this.#part("uncertainty"), this.#explanation);
-    this.#part("apply-north").hidden = !(this.changes?.mayWrite && isNorthOffered(this.#explanation));
+    showUncertainty(partOf(this.panel, "uncertainty"), this.#explanation);
+    partOf(this.panel, "apply-north").hidden = !(this.changes?.mayWrite && isNorthOffered(this.#explanation));
     const status = this.#explanation ?? this.roster.of(this.fleet.names[row]);
-    countsInto(this.#part("samples"), t("tag.used"), status?.samples);
-    countsInto(this.#part("rejected"), t("tag.rejected"), status?.rejected);
-  }
-
-  /** @param {string} name */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.panel.querySelector(`[data-part="${name}"]`));
+    countsInto(partOf(this.panel, "samples"), t("tag.used"), status?.samples);
+    countsInto(partOf(this.panel, "rejected"), t("tag.rejected"), status?.rejected);
   }
 
   /** @param {number} row */
@@ -89,20 +85,20 @@ export class Detail {
     const state = this.fleet.style(row);
     const name = this.fleet.names[row];
     this.panel.dataset.state = state.name;
-    put(this.#part("name"), this.fleet.labels[row]);
-    put(this.#part("id"), this.fleet.labels[row] === name ? "" : name);
-    put(this.#part("state"), state.label);
-    this.#part("symbol").replaceChildren(symbol(state.name).svg);
+    write(partOf(this.panel, "name"), this.fleet.labels[row]);
+    write(partOf(this.panel, "id"), this.fleet.labels[row] === name ? "" : name);
+    write(partOf(this.panel, "state"), state.label);
+    partOf(this.panel, "symbol").replaceChildren(symbol(state.name).svg);
     const { current, value } = this.fleet;
     const reason = current ? value.reason[row] : null;
-    put(this.#part("meaning"), state.meaning);
-    put(this.#part("reason"), reason ? words(reason) : "");
+    write(partOf(this.panel, "meaning"), state.meaning);
+    write(partOf(this.panel, "reason"), reason ? words(reason) : "");
     const hint = current ? hintOf(this.fleet, this.roster, row) : "";
-    put(this.#part("hint"), hint);
-    this.#part("hint").hidden = hint === "";
+    write(partOf(this.panel, "hint"), hint);
+    partOf(this.panel, "hint").hidden = hint === "";
     this.follow.setAttribute("aria-pressed", String(this.choice.follow));
-    this.#part("json").setAttribute("href", api(`tags/${encodeURIComponent(name)}/pose`).href);
-    this.#part("json").hidden = hasKey() || this.fleet.past || !this.fleet.hasPose(row); // a link carries no key
+    partOf(this.panel, "json").setAttribute("href", api(`tags/${encodeURIComponent(name)}/pose`).href);
+    partOf(this.panel, "json").hidden = hasKey() || this.fleet.past || !this.fleet.hasPose(row); // a link carries no key
   }
 
   /** @param {number} row */
@@ -126,8 +122,8 @@ export class Detail {
       age: age(this.fleet.age(row, performance.now())),
       online: !this.fleet.current || this.fleet.past ? UNKNOWN : t(this.fleet.online[row] ? "figure.online" : "figure.offline"),
     };
-    for (const [name, value] of Object.entries(texts)) put(this.#part(`v-${name}`), value);
-    this.#part("floor").hidden = texts.floor === "";
+    for (const [name, value] of Object.entries(texts)) write(partOf(this.panel, `v-${name}`), value);
+    partOf(this.panel, "floor").hidden = texts.floor === "";
     const name = this.fleet.names[row];
     this.heights.show(this.fleet.past ? this.heightsInPast(name) : heightsOfMinute(this.#explanation));
   }
@@ -136,7 +132,7 @@ export class Detail {
   #health(tag) {
     const status = this.roster.of(tag);
     this.#care(tag, status?.needs_care ?? []);
-    const box = this.#part("health");
+    const box = partOf(this.panel, "health");
     const texts = status?.health ? healthTexts(status.health) : [];
     if (status?.clock_offset) texts.push([t("health.motion_clock"), clockText(status.clock_offset)]);
     const fromMotion = status?.clock_offset?.from_motion;
@@ -155,7 +151,7 @@ export class Detail {
   /** List what a person should do, with a button where a setting of the tag does it.
    * @param {string} tag @param {import("../data/roster.js").Care[]} cares */
   #care(tag, cares) {
-    const list = this.#part("care");
+    const list = partOf(this.panel, "care");
     list.hidden = cares.length === 0;
     const mayWrite = this.changes?.mayWrite ?? false;
     const shown = JSON.stringify([tag, cares, mayWrite]);
@@ -183,7 +179,7 @@ export class Detail {
 
   /** @param {number} row */
   #hypotheses(row) {
-    const list = this.#part("hypotheses");
+    const list = partOf(this.panel, "hypotheses");
     const ghosts = this.fleet.state[row] === AMBIGUOUS ? (this.fleet.value.hypotheses[row] ?? []) : [];
     list.hidden = ghosts.length === 0;
     const likely = [...ghosts].sort((a, b) => b.weight - a.weight).slice(0, 6);
@@ -204,9 +200,9 @@ function hypothesisLine() {
 /** @param {Element} line @param {import("../data/fleet.js").Hypothesis} ghost */
 function putHypothesis(line, ghost) {
   const [where, bar, weight] = /** @type {[HTMLElement, HTMLMeterElement, HTMLElement]} */ ([...line.children]);
-  put(where, place(ghost.x, ghost.y, 1));
+  write(where, place(ghost.x, ghost.y, 1));
   bar.value = ghost.weight;
-  put(weight, percent(ghost.weight));
+  write(weight, percent(ghost.weight));
 }
 
 /** @param {HTMLElement} list @param {string} title @param {Record<string, number> | undefined} byName */
@@ -223,9 +219,4 @@ function fillList(list, texts) {
   list.hidden = texts.length === 0;
   if (list.textContent === texts.join("")) return;
   list.replaceChildren(...texts.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
-}
-
-/** @param {HTMLElement} element @param {string} text */
-function put(element, text) {
-  if (element.textContent !== text) element.textContent = text;
 }

@@ -5,6 +5,7 @@ import { saveFile } from "../data/save_file.js";
 import { count, duration, length, speed, tagCount, UNKNOWN } from "../data/format.js";
 import { isSi } from "../data/units.js";
 import { t } from "../i18n/language.js";
+import { partOf } from "../page/parts.js";
 
 const MAX_LINES = 500;
 const HEADS = ["table.tag", "figures.tracked", "figures.distance", "figures.mean", "figures.max"];
@@ -28,9 +29,9 @@ export class FiguresPanel {
     this.fleet = fleet;
     panels.addDialog("figures", dialog);
     button.addEventListener("click", () => panels.open("figures", () => this.#open()));
-    this.#part("close").addEventListener("click", () => dialog.close());
-    this.#part("save").addEventListener("click", () => this.#save());
-    this.#part("si").hidden = isSi;
+    partOf(this.dialog, "close").addEventListener("click", () => dialog.close());
+    partOf(this.dialog, "save").addEventListener("click", () => this.#save());
+    partOf(this.dialog, "si").hidden = isSi;
   }
 
   get #wanted() {
@@ -41,7 +42,7 @@ export class FiguresPanel {
   async #open() {
     const asked = ++this.#asked;
     this.#lines = [];
-    this.#part("table").hidden = true;
+    partOf(this.dialog, "table").hidden = true;
     this.#say(t("heat.loading"));
     this.dialog.showModal();
     try {
@@ -67,7 +68,7 @@ export class FiguresPanel {
       cell.append(button);
       return cell;
     });
-    this.#part("head").replaceChildren(...cells);
+    partOf(this.dialog, "head").replaceChildren(...cells);
   }
 
   /** @param {number} column */
@@ -78,12 +79,12 @@ export class FiguresPanel {
 
   #fill() {
     const shown = ordered(this.#lines, this.#column).slice(0, MAX_LINES);
-    [...this.#part("head").children].forEach((cell, at) => {
+    [...partOf(this.dialog, "head").children].forEach((cell, at) => {
       if (at - 1 === this.#column) cell.setAttribute("aria-sort", at === 0 ? "ascending" : "descending");
       else cell.removeAttribute("aria-sort");
     });
-    this.#part("lines").replaceChildren(...shown.map((line) => this.#line(line)));
-    this.#part("table").hidden = shown.length === 0;
+    partOf(this.dialog, "lines").replaceChildren(...shown.map((line) => this.#line(line)));
+    partOf(this.dialog, "table").hidden = shown.length === 0;
     const who = this.choice.group === "" ? "" : `${this.choice.group}: `;
     const more = this.#lines.length > shown.length ? ` ${t("figures.more", { n: shown.length, all: count(this.#lines.length) })}` : "";
     this.#say(shown.length === 0 ? t("past.nothing") : `${who}${tagCount(this.#lines.length)}.${more}`);
@@ -107,11 +108,6 @@ export class FiguresPanel {
 
   /** @param {string} text */
   #say(text) {
-    this.#part("answer").textContent = text;
-  }
-
-  /** @param {string} name */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.dialog.querySelector(`[data-part="${name}"]`));
+    partOf(this.dialog, "answer").textContent = text;
   }
 }

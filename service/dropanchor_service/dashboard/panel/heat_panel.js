@@ -5,6 +5,7 @@ import { age, distance, percent, place } from "../data/format.js";
 import { HeatMap, hottest, leftOut } from "../data/heat_map.js";
 import { t } from "../i18n/language.js";
 import { HeatPainter, heatColour } from "../map/draw_heat_map.js";
+import { partOf } from "../page/parts.js";
 
 const STOPS = 7;
 
@@ -58,19 +59,19 @@ export class HeatPanel {
     this.legend.setAttribute("aria-busy", String(loading));
     if (!active) return;
     this.#put("who", t("heat.of", { who: this.#who }));
-    this.#part("scale").hidden = !scale;
+    partOf(this.legend, "scale").hidden = !scale;
     if (scale) scale.marks.forEach((seconds, i) => this.#put(["low", "middle", "high"][i], age(seconds)));
     this.#put("unit", heat && scale ? t("heat.unit", { side: distance(heat.cell_m, 3) }) : "");
     if (problem || (heat && !scale)) this.#unfold(true);
     this.#put("note", problem || (heat ? noteOf(heat) : t("heat.loading")));
     const isDark = document.documentElement.dataset.theme === "dark";
     const stops = Array.from({ length: STOPS }, (_, i) => heatColour(i / (STOPS - 1), isDark));
-    this.#part("bar").style.backgroundImage = `linear-gradient(to right, ${stops.join(", ")})`;
+    partOf(this.legend, "bar").style.backgroundImage = `linear-gradient(to right, ${stops.join(", ")})`;
   }
 
   /** @param {boolean} is */
   #unfold(is) {
-    /** @type {HTMLDetailsElement} */ (this.#part("fold")).open = is;
+    /** @type {HTMLDetailsElement} */ (partOf(this.legend, "fold")).open = is;
   }
 
   get #who() {
@@ -81,12 +82,7 @@ export class HeatPanel {
 
   /** @param {string} name @param {string} text */
   #put(name, text) {
-    if (this.#part(name).textContent !== text) this.#part(name).textContent = text;
-  }
-
-  /** @param {string} name */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.legend.querySelector(`[data-part="${name}"]`));
+    if (partOf(this.legend, name).textContent !== text) partOf(this.legend, name).textContent = text;
   }
 }
 

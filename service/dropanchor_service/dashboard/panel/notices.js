@@ -6,9 +6,7 @@ import { age } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { shareToken } from "../data/shared.js";
 import { SharedNotice } from "./shared_notice.js";
-
-/** @param {string} id */
-const byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+import { byId, write } from "../page/parts.js";
 
 export class Notices {
   #shared = new SharedNotice();
@@ -61,11 +59,6 @@ export class Notices {
     field.value = "";
     this.connection.retry();
   }
-}
-
-/** @param {HTMLElement} element @param {string} text */
-function write(element, text) {
-  if (element.textContent !== text) element.textContent = text;
 }
 
 /** @param {Element} button */

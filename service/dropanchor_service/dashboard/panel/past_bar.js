@@ -3,6 +3,7 @@
 import { HOUR_MS, LONGEST_MS, QUICK, dayOf, gapAt, quickPeriod, stripPath } from "../data/periods.js";
 import { SPEEDS } from "../data/replay.js";
 import { decimal, t, timeText } from "../i18n/language.js";
+import { partOf, write } from "../page/parts.js";
 
 /** A shorter gap is not worth a sentence. */
 const GAP_MS = 60_000;
@@ -18,19 +19,19 @@ export class PastBar extends EventTarget {
     this.bar = bar;
     this.replay = replay;
     this.times = times;
-    this.heatButton = this.#part("heat");
-    this.figuresButton = this.#part("figures");
-    this.slider = /** @type {HTMLInputElement} */ (this.#part("slider"));
-    this.speed = /** @type {HTMLSelectElement} */ (this.#part("speed"));
+    this.heatButton = partOf(this.bar, "heat");
+    this.figuresButton = partOf(this.bar, "figures");
+    this.slider = /** @type {HTMLInputElement} */ (partOf(this.bar, "slider"));
+    this.speed = /** @type {HTMLSelectElement} */ (partOf(this.bar, "speed"));
     this.speed.append(...SPEEDS.map((speed) => new Option(`× ${decimal(speed, 0, 1)}`, String(speed), speed === 1)));
     bar.addEventListener("submit", (event) => this.#choose(event));
-    this.#part("play").addEventListener("click", () => replay.play(!replay.playing));
-    this.#part("leave").addEventListener("click", () => this.dispatchEvent(new Event("leave")));
+    partOf(this.bar, "play").addEventListener("click", () => replay.play(!replay.playing));
+    partOf(this.bar, "leave").addEventListener("click", () => this.dispatchEvent(new Event("leave")));
     this.slider.addEventListener("input", () => replay.seek(replay.from_ms + Number(this.slider.value) * 1000));
     this.speed.addEventListener("change", () => (replay.speed = Number(this.speed.value)));
-    for (const choice of QUICK) this.#part(choice).addEventListener("click", () => this.#open(quickPeriod(choice, Date.now())));
-    this.#part("day").addEventListener("change", () => this.#chooseDay());
-    this.#part("other").addEventListener("click", () => this.#unfold());
+    for (const choice of QUICK) partOf(this.bar, choice).addEventListener("click", () => this.#open(quickPeriod(choice, Date.now())));
+    partOf(this.bar, "day").addEventListener("change", () => this.#chooseDay());
+    partOf(this.bar, "other").addEventListener("click", () => this.#unfold());
     replay.addEventListener("period", () => this.#showPeriod());
     times.addEventListener("change", () => this.#showStretches());
     for (const name of ["time", "state"]) replay.addEventListener(name, () => this.update());
@@ -44,7 +45,7 @@ export class PastBar extends EventTarget {
 
   /** Say why there is nothing to show. @param {string} text */
   explain(text) {
-    put(this.#part("problem"), text);
+    write(partOf(this.bar, "problem"), text);
   }
 
   update() {
@@ -52,9 +53,9 @@ export class PastBar extends EventTarget {
     const seconds = Math.round((replay.time_ms - replay.from_ms) / 1000);
     if (Number(this.slider.value) !== seconds) this.slider.value = String(seconds);
     this.slider.setAttribute("aria-valuetext", localTime(replay.time_ms));
-    put(this.#part("time"), localTime(replay.time_ms));
-    this.#part("time").setAttribute("datetime", new Date(replay.time_ms).toISOString());
-    const play = this.#part("play");
+    write(partOf(this.bar, "time"), localTime(replay.time_ms));
+    partOf(this.bar, "time").setAttribute("datetime", new Date(replay.time_ms).toISOString());
+    const play = partOf(this.bar, "play");
     play.setAttribute("aria-label", t(replay.playing ? "past.pause" : "past.play"));
     play.title = t(replay.playing ? "past.pause_key" : "past.play_key");
     play.dataset.playing = String(replay.playing);
@@ -63,7 +64,7 @@ export class PastBar extends EventTarget {
     const isDone = !replay.loading && replay.problem === "" && replay.isLoaded;
     const nothing = isDone && replay.figures.size === 0;
     this.explain(this.#refusal || (nothing ? this.#nothing() : replay.problem));
-    put(this.#part("gap"), isDone && !nothing ? this.#gap() : "");
+    write(partOf(this.bar, "gap"), isDone && !nothing ? this.#gap() : "");
   }
 
   /** Say that there is nothing, and when there is something. */
@@ -84,8 +85,8 @@ export class PastBar extends EventTarget {
 
   #showStretches() {
     const { stretches } = this.times;
-    this.#part("strip").toggleAttribute("hidden", stretches === null);
-    this.#part("stored").setAttribute("d", stretches ? stripPath(stretches, this.replay) : "");
+    partOf(this.bar, "strip").toggleAttribute("hidden", stretches === null);
+    partOf(this.bar, "stored").setAttribute("d", stretches ? stripPath(stretches, this.replay) : "");
     this.update();
   }
 
@@ -120,7 +121,7 @@ export class PastBar extends EventTarget {
   /** Show or hide the start and the end, which a phone has no room for. */
   #unfold() {
     const isOpen = this.bar.classList.toggle("unfolded");
-    this.#part("other").setAttribute("aria-expanded", String(isOpen));
+    partOf(this.bar, "other").setAttribute("aria-expanded", String(isOpen));
   }
 
   /** @param {import("../data/periods.js").Period} period */
@@ -137,12 +138,7 @@ export class PastBar extends EventTarget {
 
   /** @param {string} name */
   #input(name) {
-    return /** @type {HTMLInputElement} */ (this.#part(name));
-  }
-
-  /** @param {string} name */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.bar.querySelector(`[data-part="${name}"]`));
+    return /** @type {HTMLInputElement} */ (partOf(this.bar, name));
   }
 }
 
@@ -150,8 +146,3 @@ export class PastBar extends EventTarget {
 export const localTime = (time_ms) => timeText(time_ms, {
   weekday: "short", day: "numeric", month: "short", year: "numeric", hour: "2-digit", minute: "2-digit", second: "2-digit", timeZoneName: "short",
 });
-
-/** @param {HTMLElement} element @param {string} text */
-function put(element, text) {
-  if (element.textContent !== text) element.textContent = text;
-}

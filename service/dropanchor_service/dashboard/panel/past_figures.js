@@ -7,6 +7,7 @@ import { t } from "../i18n/language.js";
 import { saveFile } from "../data/save_file.js";
 import { nanoseconds } from "../data/track_reader.js";
 import { isSi } from "../data/units.js";
+import { partOf } from "../page/parts.js";
 
 const GEOREFERENCED = ["geojson", "gpx", "kml"];
 
@@ -21,7 +22,7 @@ export class PastFigures {
     for (const button of box.querySelectorAll("button")) {
       button.addEventListener("click", () => this.#save(button.dataset.format ?? "csv"));
     }
-    this.#part("si").hidden = isSi;
+    partOf(this.box, "si").hidden = isSi;
     choice.addEventListener("change", () => this.update());
     replay.addEventListener("period", () => this.update());
   }
@@ -30,13 +31,13 @@ export class PastFigures {
   set georeferenced(is) {
     this.isGeoreferenced = is;
     for (const button of this.box.querySelectorAll("button")) button.disabled = !is && GEOREFERENCED.includes(button.dataset.format ?? "");
-    this.#part("no-georeference").hidden = is;
+    partOf(this.box, "no-georeference").hidden = is;
   }
 
   update() {
     const figure = this.replay.figures.get(this.choice.selected)?.figure;
     this.box.hidden = !figure;
-    this.#part("answer").textContent = "";
+    partOf(this.box, "answer").textContent = "";
     if (!figure) return;
     const texts = {
       distance: distance(figure.distance_m, 4),
@@ -45,7 +46,7 @@ export class PastFigures {
       max: speed(figure.max_speed_mps),
       poses: count(figure.poses),
     };
-    for (const [name, text] of Object.entries(texts)) this.#part(name).textContent = text || UNKNOWN;
+    for (const [name, text] of Object.entries(texts)) partOf(this.box, name).textContent = text || UNKNOWN;
   }
 
   /** Save the whole track. @param {string} format */
@@ -55,18 +56,13 @@ export class PastFigures {
     url.search = new URLSearchParams({
       format, from: nanoseconds(this.replay.from_ms), to: nanoseconds(this.replay.to_ms),
     }).toString();
-    this.#part("answer").textContent = t("figures.preparing");
+    partOf(this.box, "answer").textContent = t("figures.preparing");
     try {
       await saveFile(url, `${tag}.${format}`);
-      this.#part("answer").textContent = t("figures.saved", { file: `${tag}.${format}` });
+      partOf(this.box, "answer").textContent = t("figures.saved", { file: `${tag}.${format}` });
     } catch (error) {
       const lacks = format === "parquet" && error instanceof RefusedError;
-      this.#part("answer").textContent = t(lacks ? "figures.no_parquet" : "figures.failed");
+      partOf(this.box, "answer").textContent = t(lacks ? "figures.no_parquet" : "figures.failed");
     }
-  }
-
-  /** @param {string} name */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.box.querySelector(`[data-part="${name}"]`));
   }
 }

@@ -4,6 +4,7 @@ import { t } from "../i18n/language.js";
 import { Comparison } from "./comparison.js";
 import { TracksExport } from "./tracks_export.js";
 import { MOST_SELECTED } from "../page/choice.js";
+import { partOf, write } from "../page/parts.js";
 
 /** On a phone the table and the forms would cover the list. */
 const NARROW = "(max-width: 800px)";
@@ -21,12 +22,12 @@ export class SeveralPanel {
     this.changes = changes;
     this.past = past;
     this.comparison = new Comparison(/** @type {HTMLTableElement} */ (panel.querySelector("table")), fleet, roster);
-    this.group = /** @type {HTMLFormElement} */ (this.#part("group"));
-    this.tracks = new TracksExport(/** @type {HTMLFormElement} */ (this.#part("export")), choice, past);
-    /** @type {HTMLDetailsElement} */ (this.#part("more")).open = this.#isCompared;
-    this.#part("follow-all").addEventListener("click", () => (choice.follow = !choice.follow));
-    this.#part("compare").addEventListener("click", () => this.#compare());
-    this.#part("close").addEventListener("click", leave);
+    this.group = /** @type {HTMLFormElement} */ (partOf(this.panel, "group"));
+    this.tracks = new TracksExport(/** @type {HTMLFormElement} */ (partOf(this.panel, "export")), choice, past);
+    /** @type {HTMLDetailsElement} */ (partOf(this.panel, "more")).open = this.#isCompared;
+    partOf(this.panel, "follow-all").addEventListener("click", () => (choice.follow = !choice.follow));
+    partOf(this.panel, "compare").addEventListener("click", () => this.#compare());
+    partOf(this.panel, "close").addEventListener("click", leave);
     this.group.addEventListener("focusin", () => this.#offerGroups());
     this.group.addEventListener("submit", (event) => this.#putIntoGroup(event));
     choice.addEventListener("change", () => this.update());
@@ -38,11 +39,11 @@ export class SeveralPanel {
     const tags = choice.several;
     this.panel.hidden = tags.length === 0;
     if (tags.length === 0) return;
-    put(this.#part("title"), t("several.selected", { n: tags.length }));
-    put(this.#part("note"), tags.length === MOST_SELECTED ? t("several.most", { n: MOST_SELECTED }) : choice.gathering ? t("several.gathering") : "");
-    this.#part("follow-all").setAttribute("aria-pressed", String(choice.follow));
-    this.#part("compare").setAttribute("aria-expanded", String(this.#isCompared));
-    this.#part("table").hidden = !this.#isCompared;
+    write(partOf(this.panel, "title"), t("several.selected", { n: tags.length }));
+    write(partOf(this.panel, "note"), tags.length === MOST_SELECTED ? t("several.most", { n: MOST_SELECTED }) : choice.gathering ? t("several.gathering") : "");
+    partOf(this.panel, "follow-all").setAttribute("aria-pressed", String(choice.follow));
+    partOf(this.panel, "compare").setAttribute("aria-expanded", String(this.#isCompared));
+    partOf(this.panel, "table").hidden = !this.#isCompared;
     this.group.hidden = !this.changes.mayWrite || this.past.active;
     this.tracks.update();
     if (this.#isCompared) this.comparison.update(tags);
@@ -72,14 +73,4 @@ export class SeveralPanel {
     }
     field.value = "";
   }
-
-  /** @param {string} name */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.panel.querySelector(`[data-part="${name}"]`));
-  }
-}
-
-/** @param {HTMLElement} element @param {string} text */
-function put(element, text) {
-  if (element.textContent !== text) element.textContent = text;
 }

@@ -2,9 +2,7 @@
 
 import { isLimited, shareClaims, shareToken } from "../data/shared.js";
 import { t, timeText } from "../i18n/language.js";
-
-/** @param {string} id */
-const byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+import { byId } from "../page/parts.js";
 
 /** @param {number} unix_s */
 const dateText = (unix_s) => timeText(unix_s * 1000, { dateStyle: "medium", timeStyle: "short" });

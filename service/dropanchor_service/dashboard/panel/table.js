@@ -5,6 +5,7 @@ import { t } from "../i18n/language.js";
 import { Order } from "../data/order.js";
 import { NameColumn } from "../data/names.js";
 import { symbol } from "../map/symbols.js";
+import { write } from "../page/parts.js";
 
 /** @typedef {import("../data/fleet.js").Fleet} Fleet */
 /** @typedef {"only" | "toggle" | "range"} Pick how a row was chosen: alone, in addition, or all rows up to it */
@@ -148,7 +149,7 @@ export class TagTable {
       this.#names.of(label), state.label, coordinate(x[row]), coordinate(y[row]), half(semi_major_m[row]), speedNumber(speed_mps[row], 2),
       age(seconds), !fleet.current ? UNKNOWN : t(fleet.online[row] ? "figure.online" : "figure.offline"),
     ];
-    texts.forEach((value, i) => text(i === 0 ? nameOf(line) : line.cells[i], value));
+    texts.forEach((value, i) => write(i === 0 ? nameOf(line) : line.cells[i], value));
     const isElsewhere = this.isElsewhere(row);
     const full = label === name ? name : `${label} (${name})`;
     const words = isElsewhere ? t("table.elsewhere", { tag: full }) : full;
@@ -239,11 +240,6 @@ const nameOf = ({ cells }) => /** @type {HTMLElement} */ (cells[0].lastElementCh
  * @param {string} value */
 function set(data, name, value) {
   if (data[name] !== value) data[name] = value;
-}
-
-/** @param {Element} element @param {string} value */
-function text(element, value) {
-  if (element.textContent !== value) element.textContent = value;
 }
 
 /** @param {Element} element @param {string} name @param {string} value */

@@ -7,6 +7,7 @@ import { isWorldFile, worldOf } from "./world_file.js";
 import { readMeasure, writeMeasure } from "../data/units.js";
 import { t } from "../i18n/language.js";
 import { begun, refusal } from "../i18n/said.js";
+import { fieldOf, partOf, writeOrHide } from "../page/parts.js";
 
 const DEGREES = 180 / Math.PI;
 
@@ -23,16 +24,16 @@ export class PlanPanel {
     this.dialog = dialog;
     this.editor = editor;
     this.changes = changes;
-    this.list = this.#part("list");
-    this.upload = /** @type {HTMLFormElement} */ (this.#part("upload"));
-    this.form = /** @type {HTMLFormElement} */ (this.#part("form"));
-    this.points = new PlanPoints(this.#part("points"), editor);
+    this.list = partOf(this.panel, "list");
+    this.upload = /** @type {HTMLFormElement} */ (partOf(this.panel, "upload"));
+    this.form = /** @type {HTMLFormElement} */ (partOf(this.panel, "form"));
+    this.points = new PlanPoints(partOf(this.panel, "points"), editor);
     panels.add("plans", { isOpen: () => editor.isOpen, isUnsaved: () => editor.isUnsaved, saving: () => editor.saving.now, leave: () => editor.close() });
     toggle.addEventListener("click", () => panels.toggle("plans", () => editor.open()));
-    this.#part("close").addEventListener("click", () => panels.close("plans"));
-    this.#part("delete").addEventListener("click", () => this.#delete());
-    this.#part("move").addEventListener("click", () => editor.setMode("move"));
-    this.#part("pick").addEventListener("click", () => editor.setMode("pick"));
+    partOf(this.panel, "close").addEventListener("click", () => panels.close("plans"));
+    partOf(this.panel, "delete").addEventListener("click", () => this.#delete());
+    partOf(this.panel, "move").addEventListener("click", () => editor.setMode("move"));
+    partOf(this.panel, "pick").addEventListener("click", () => editor.setMode("pick"));
     this.upload.addEventListener("change", () => this.#chosen());
     this.upload.addEventListener("submit", (event) => this.#send(event));
     this.form.addEventListener("input", (event) => this.#typed(/** @type {HTMLInputElement} */ (event.target)));
@@ -52,16 +53,6 @@ export class PlanPanel {
     this.#update();
   }
 
-  /** @param {string} name */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.panel.querySelector(`[data-part="${name}"]`));
-  }
-
-  /** @param {HTMLFormElement} form @param {string} name */
-  #field(form, name) {
-    return /** @type {HTMLInputElement} */ (form.elements.namedItem(name));
-  }
-
   #update() {
     const { editor, changes } = this;
     this.toggle.hidden = !changes.mayWrite;
@@ -70,9 +61,9 @@ export class PlanPanel {
     this.#fillList();
     this.form.hidden = editor.draft === null;
     this.upload.hidden = editor.draft !== null;
-    this.#part("delete").hidden = !changes.mayDelete;
-    for (const mode of /** @type {const} */ (["move", "pick"])) this.#part(mode).setAttribute("aria-pressed", String(editor.mode === mode));
-    write(this.#part("how"), editor.mode === "" ? "" : t(editor.isBeside ? "plans.how_beside" : `plans.how_${editor.mode}`));
+    partOf(this.panel, "delete").hidden = !changes.mayDelete;
+    for (const mode of /** @type {const} */ (["move", "pick"])) partOf(this.panel, mode).setAttribute("aria-pressed", String(editor.mode === mode));
+    writeOrHide(partOf(this.panel, "how"), editor.mode === "" ? "" : t(editor.isBeside ? "plans.how_beside" : `plans.how_${editor.mode}`));
     if (!editor.isOpen) this.#say("");
     if (editor.draft) this.#fillForm(editor.draft);
     this.points.update();
@@ -106,18 +97,18 @@ export class PlanPanel {
       width: rounded(placement.m_per_px * image.width_px, 3), distance: this.editor.distance_m ?? "",
     };
     for (const [key, value] of Object.entries(values)) {
-      const field = this.#field(this.form, key);
+      const field = fieldOf(this.form, key);
       if (!isOther && (field === document.activeElement || isFloor(key))) continue;
       if (field.dataset.measure) writeMeasure(field, value === "" ? null : Number(value));
       else field.value = String(value);
     }
-    this.#field(this.form, "dark_inverted").checked = dark_inverted;
+    fieldOf(this.form, "dark_inverted").checked = dark_inverted;
     this.#requireHeights();
   }
 
   /** A floor needs a name and both heights, or none of them. */
   #requireHeights() {
-    const fields = ["floor", "bottom", "top"].map((name) => this.#field(this.form, name));
+    const fields = ["floor", "bottom", "top"].map((name) => fieldOf(this.form, name));
     const isGiven = fields.some(({ value }) => value !== "");
     for (const field of fields) field.required = isGiven;
     const [, bottom, top] = fields;
@@ -141,17 +132,17 @@ export class PlanPanel {
 
   /** @returns {import("./plan_store.js").Floor | null} */
   #floor() {
-    const [bottom, top] = ["bottom", "top"].map((name) => valueOf(this.#field(this.form, name)));
-    const name = this.#field(this.form, "floor").value.trim();
+    const [bottom, top] = ["bottom", "top"].map((name) => valueOf(fieldOf(this.form, name)));
+    const name = fieldOf(this.form, "floor").value.trim();
     return name === "" || bottom === null || top === null ? null : { name, bottom_m: bottom, top_m: top };
   }
 
   /** Ask only what the chosen files need. */
   #chosen() {
-    const files = [...(this.#field(this.upload, "file").files ?? [])];
+    const files = [...(fieldOf(this.upload, "file").files ?? [])];
     const needs = { page: files.some(({ name }) => /\.pdf$/i.test(name)), crs: files.some(({ name }) => isWorldFile(name) || /\.tiff?$/i.test(name)) };
     for (const [name, isNeeded] of Object.entries(needs)) {
-      const field = this.#field(this.upload, name);
+      const field = fieldOf(this.upload, name);
       field.disabled = !isNeeded;
       /** @type {HTMLElement} */ (field.closest("label")).hidden = !isNeeded;
     }
@@ -160,11 +151,11 @@ export class PlanPanel {
   /** @param {Event} event */
   async #send(event) {
     event.preventDefault();
-    const files = [...(this.#field(this.upload, "file").files ?? [])];
+    const files = [...(fieldOf(this.upload, "file").files ?? [])];
     const [world, file] = [files.find(({ name }) => isWorldFile(name)), files.find(({ name }) => !isWorldFile(name))];
     this.#say(file ? "" : t("plans.no_image"));
     if (!file) return;
-    write(this.#part("busy"), t("plans.reading", { file: file.name }));
+    writeOrHide(partOf(this.panel, "busy"), t("plans.reading", { file: file.name }));
     try {
       const given = new FormData(this.upload);
       const query = ["page", "crs"].map((name) => [name, String(given.get(name) ?? "")]).filter(([, value]) => value !== "");
@@ -175,12 +166,12 @@ export class PlanPanel {
     } catch (error) {
       this.#say(refusal(error));
     }
-    write(this.#part("busy"), "");
+    writeOrHide(partOf(this.panel, "busy"), "");
   }
 
   /** @param {string} text */
   #say(text) {
-    write(this.#part("problem"), begun(text));
+    writeOrHide(partOf(this.panel, "problem"), begun(text));
   }
 
   async #delete() {
@@ -203,9 +194,3 @@ function placed(name, number, width_px) {
 
 /** @param {number} value @param {number} decimals */
 const rounded = (value, decimals) => Number(value.toFixed(decimals));
-
-/** @param {HTMLElement} target @param {string} text */
-function write(target, text) {
-  if (target.textContent !== text) target.textContent = text;
-  target.hidden = text === "";
-}

@@ -8,9 +8,7 @@ import { PlanImages } from "./plan_images.js";
 import { PlanPanel } from "./plan_panel.js";
 import { PlanStore } from "./plan_store.js";
 import { t } from "../i18n/language.js";
-
-/** @template {HTMLElement} T @param {string} id @returns {T} */
-const byId = (id) => /** @type {T} */ (document.getElementById(id));
+import { byId } from "../page/parts.js";
 
 export class Plans {
   store = new PlanStore();

@@ -6,6 +6,7 @@ import { t } from "../i18n/language.js";
 import { nameKey } from "../data/order.js";
 import { readMeasure, writeMeasure } from "../data/units.js";
 import { confirmed } from "./confirm.js";
+import { fieldOf, partOf } from "../page/parts.js";
 
 const FIELDS = /** @type {const} */ (["x", "y", "z"]);
 
@@ -21,14 +22,14 @@ export class AnchorPanel {
     this.dialog = dialog;
     this.panels = panels;
     this.fleet = fleet;
-    this.list = this.#part("list");
-    this.form = /** @type {HTMLFormElement} */ (this.#part("form"));
+    this.list = partOf(this.panel, "list");
+    this.form = /** @type {HTMLFormElement} */ (partOf(this.panel, "form"));
     panels.add("anchors", { isOpen: () => editor.isOpen, isUnsaved: () => editor.isUnsaved, leave: () => editor.close() });
     editor.choose = (id) => panels.open("anchors", () => editor.select(id));
     toggle.addEventListener("click", () => panels.toggle("anchors", () => editor.open()));
-    this.#part("close").addEventListener("click", () => panels.close("anchors"));
-    this.#part("new").addEventListener("click", () => this.add());
-    this.#part("delete").addEventListener("click", () => this.#delete());
+    partOf(this.panel, "close").addEventListener("click", () => panels.close("anchors"));
+    partOf(this.panel, "new").addEventListener("click", () => this.add());
+    partOf(this.panel, "delete").addEventListener("click", () => this.#delete());
     this.form.addEventListener("input", () => this.#typed());
     this.form.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -50,18 +51,8 @@ export class AnchorPanel {
   add(id, place) {
     this.panels.open("anchors", () => {
       this.editor.add(id, place);
-      this.#field(id ? "x" : "id").select();
+      fieldOf(this.form, id ? "x" : "id").select();
     });
-  }
-
-  /** @param {string} name */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.panel.querySelector(`[data-part="${name}"]`));
-  }
-
-  /** @param {string} name */
-  #field(name) {
-    return /** @type {HTMLInputElement} */ (this.form.elements.namedItem(name));
   }
 
   #update() {
@@ -72,14 +63,14 @@ export class AnchorPanel {
     this.panel.hidden = !editor.isOpen;
     this.#fillList();
     this.form.hidden = draft === null;
-    this.#part("delete").hidden = editor.isNew || !changes.mayDelete;
+    partOf(this.panel, "delete").hidden = editor.isNew || !changes.mayDelete;
     const { origin } = editor;
-    this.#part("save").textContent = t(editor.isNew ? "anchors.add_new" : origin ? "anchors.move" : "save");
-    this.#part("moves").textContent = draft && origin ? this.#question(origin, draft) : "";
-    this.#field("id").readOnly = !editor.isNew;
+    partOf(this.panel, "save").textContent = t(editor.isNew ? "anchors.add_new" : origin ? "anchors.move" : "save");
+    partOf(this.panel, "moves").textContent = draft && origin ? this.#question(origin, draft) : "";
+    fieldOf(this.form, "id").readOnly = !editor.isNew;
     if (!draft) return;
-    if (this.#field("id").value !== draft.id) this.#field("id").value = draft.id;
-    for (const name of FIELDS) writeMeasure(this.#field(name), draft[name]);
+    if (fieldOf(this.form, "id").value !== draft.id) fieldOf(this.form, "id").value = draft.id;
+    for (const name of FIELDS) writeMeasure(fieldOf(this.form, name), draft[name]);
   }
 
   /** @param {import("./anchors.js").Anchor} from @param {import("./anchors.js").Anchor} to */
@@ -108,9 +99,9 @@ export class AnchorPanel {
   }
 
   #typed() {
-    const values = Object.fromEntries(FIELDS.map((name) => [name, readMeasure(this.#field(name))]));
+    const values = Object.fromEntries(FIELDS.map((name) => [name, readMeasure(fieldOf(this.form, name))]));
     if (FIELDS.some((name) => values[name] === null)) return; // the form says what is missing when it is sent
-    this.editor.change({ id: this.#field("id").value, ...values });
+    this.editor.change({ id: fieldOf(this.form, "id").value, ...values });
   }
 
   async #delete() {

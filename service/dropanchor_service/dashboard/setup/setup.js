@@ -11,9 +11,7 @@ import { Outcome } from "./outcome.js";
 import { StartEditor } from "./start.js";
 import { TagPanel } from "./tag_panel.js";
 import { installUndoKeys } from "./undo_keys.js";
-
-/** @template {HTMLElement} T @param {string} id @returns {T} */
-const byId = (id) => /** @type {T} */ (document.getElementById(id));
+import { byId } from "../page/parts.js";
 
 export class Setup {
   changes = new Changes();

@@ -2,6 +2,7 @@
 
 import { readMeasure, writeMeasure } from "../data/units.js";
 import { t } from "../i18n/language.js";
+import { fieldOf } from "../page/parts.js";
 
 const DEGREES = 180 / Math.PI;
 const FIELDS = ["name", "group", "colour", "motion", "mount", "height"];
@@ -11,9 +12,6 @@ const COLOURS = [
   ["blue", "#2f7fd0"], ["orange", "#d97a0a"], ["green", "#1b8a6b"], ["yellow", "#b89b00"], ["pink", "#c7609a"],
   ["red", "#cf4a12"], ["grey", "#7a8793"],
 ];
-
-/** @param {HTMLFormElement} form @param {string} name */
-const field = (form, name) => /** @type {HTMLInputElement} */ (form.elements.namedItem(name));
 
 /** Return the number in a field; null when it is empty. @param {HTMLInputElement} input */
 export const numberOf = (input) => (Number.isNaN(input.valueAsNumber) ? null : input.valueAsNumber);
@@ -30,9 +28,9 @@ export function fillForm(form, settings, groups) {
     name: settings.name, group: settings.group, colour: settings.colour ?? "", motion: settings.motion,
     mount: angle === null ? "" : String(Math.round(angle * DEGREES * 10) / 10),
   };
-  for (const [name, text] of Object.entries(texts)) field(form, name).value = field(form, name).dataset.shown = text;
+  for (const [name, text] of Object.entries(texts)) fieldOf(form, name).value = fieldOf(form, name).dataset.shown = text;
   noteSent(form, false);
-  writeMeasure(field(form, "height"), (settings.height_told ?? settings.height_m !== 0) ? settings.height_m : null);
+  writeMeasure(fieldOf(form, "height"), (settings.height_told ?? settings.height_m !== 0) ? settings.height_m : null);
   form.querySelector("datalist")?.replaceChildren(...[...groups].sort().map((group) => new Option(group)));
 }
 
@@ -41,27 +39,27 @@ const isTyped = ({ value, dataset }) => value !== (dataset.sent ?? dataset.shown
 
 /** Note that what the form shows now is being saved, or that it is not. @param {HTMLFormElement} form @param {boolean} isSent */
 export function noteSent(form, isSent) {
-  for (const { dataset, value } of FIELDS.map((name) => field(form, name))) isSent ? (dataset.sent = value) : delete dataset.sent;
+  for (const { dataset, value } of FIELDS.map((name) => fieldOf(form, name))) isSent ? (dataset.sent = value) : delete dataset.sent;
 }
 
 /** Return what puts back what a person has typed and not saved, after the form was filled anew. @param {HTMLFormElement} form */
 export function typedIn(form) {
-  const typed = FIELDS.map((name) => field(form, name)).filter(isTyped).map((input) => ({ input, value: input.value }));
+  const typed = FIELDS.map((name) => fieldOf(form, name)).filter(isTyped).map((input) => ({ input, value: input.value }));
   return () => typed.forEach(({ input, value }) => (input.value = value));
 }
 
 /** Return the settings that a person has changed. @param {HTMLFormElement} form */
 export function patchOf(form) {
-  const angle = numberOf(field(form, "mount"));
-  const height_m = readMeasure(field(form, "height"));
+  const angle = numberOf(fieldOf(form, "mount"));
+  const height_m = readMeasure(fieldOf(form, "height"));
   const values = [
-    ["name", "name", field(form, "name").value.trim()],
-    ["group", "group", field(form, "group").value.trim()],
-    ["colour", "colour", field(form, "colour").value || null],
-    ["motion", "motion", field(form, "motion").value],
+    ["name", "name", fieldOf(form, "name").value.trim()],
+    ["group", "group", fieldOf(form, "group").value.trim()],
+    ["colour", "colour", fieldOf(form, "colour").value || null],
+    ["motion", "motion", fieldOf(form, "motion").value],
     ["mount", "mount_angle_rad", angle === null ? null : angle / DEGREES],
     ["height", "height_m", height_m ?? 0],
     ["height", "height_told", height_m === 0 ? true : null], // 0 is also what a tag has that nobody told one
   ];
-  return Object.fromEntries(values.filter(([name]) => isTyped(field(form, String(name)))).map(([, key, value]) => [key, value]));
+  return Object.fromEntries(values.filter(([name]) => isTyped(fieldOf(form, String(name)))).map(([, key, value]) => [key, value]));
 }

@@ -5,6 +5,7 @@ import { Saving } from "../data/saving.js";
 import { confirmed } from "./confirm.js";
 import { fillForm, noteSent, numberOf, patchOf, typedIn } from "./tag_form.js";
 import { t } from "../i18n/language.js";
+import { partOf } from "../page/parts.js";
 
 /** @typedef {import("../data/changes.js").Seen} Seen */
 
@@ -29,9 +30,9 @@ export class TagPanel {
     this.choice = choice;
     this.changes = changes;
     this.start = start;
-    this.box = /** @type {HTMLDetailsElement} */ (this.#part("settings"));
-    this.form = /** @type {HTMLFormElement} */ (this.#part("settings-form"));
-    this.startForm = /** @type {HTMLFormElement} */ (this.#part("start-form"));
+    this.box = /** @type {HTMLDetailsElement} */ (partOf(this.panel, "settings"));
+    this.form = /** @type {HTMLFormElement} */ (partOf(this.panel, "settings-form"));
+    this.startForm = /** @type {HTMLFormElement} */ (partOf(this.panel, "start-form"));
     panels.add("tag", {
       isOpen: () => choice.selected !== null, isUnsaved: () => this.#isTyped || start.isUnsaved,
       saving: () => this.#saving.now, leave: () => choice.select(null),
@@ -39,8 +40,8 @@ export class TagPanel {
     panels.add("start", { isOpen: () => start.draft !== null, isUnsaved: () => start.isUnsaved, saving: () => this.#saving.now, leave: () => start.cancel() });
     this.box.addEventListener("toggle", () => this.#seen === null && this.#load());
     this.form.addEventListener("submit", (event) => this.#save(event));
-    this.#part("delete-tag").addEventListener("click", () => this.#delete());
-    this.#part("start").addEventListener("click", () => panels.open("start", () => this.#beginStart()));
+    partOf(this.panel, "delete-tag").addEventListener("click", () => this.#delete());
+    partOf(this.panel, "start").addEventListener("click", () => panels.open("start", () => this.#beginStart()));
     this.startForm.addEventListener("input", () => this.#typedStart());
     this.startForm.addEventListener("submit", (event) => this.#saveStart(event));
     this.startForm.addEventListener("reset", () => start.cancel());
@@ -52,18 +53,13 @@ export class TagPanel {
   }
 
   update() {
-    this.#part("actions").hidden = !this.changes.mayWrite;
-    this.#part("delete-tag").hidden = !this.changes.mayDelete;
+    partOf(this.panel, "actions").hidden = !this.changes.mayWrite;
+    partOf(this.panel, "delete-tag").hidden = !this.changes.mayDelete;
     const tag = this.choice.selected ?? "";
     if (tag === this.#tag) return;
     this.#tag = tag;
     this.start.cancel();
     this.#load();
-  }
-
-  /** @param {string} name */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.panel.querySelector(`[data-part="${name}"]`));
   }
 
   get #isTyped() {
@@ -161,7 +157,7 @@ export class TagPanel {
   #showStart() {
     const { draft, degrees } = this.start;
     this.startForm.hidden = draft === null;
-    this.#part("start").hidden = draft !== null;
+    partOf(this.panel, "start").hidden = draft !== null;
     if (!draft) return;
     for (const name of /** @type {const} */ (["x", "y"])) writeMeasure(this.#startField(name), draft[name]);
     const heading = this.#startField("heading");

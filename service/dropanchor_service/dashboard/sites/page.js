@@ -8,6 +8,7 @@ import { count, t } from "../i18n/language.js";
 import { installLanguages } from "../page/display.js";
 import { installTheme } from "../page/theme.js";
 import { dots, listed, MAP, nameOf } from "./overview.js";
+import { byId } from "../page/parts.js";
 
 const REQUEST_MS = 3000;
 /** The answer grows with the sites, so a page of many asks less often. */
@@ -18,9 +19,6 @@ const SVG = "http://www.w3.org/2000/svg";
 translate(document);
 
 /** @typedef {import("./overview.js").Summary} Summary */
-/** @template {HTMLElement} T @param {string} id @returns {T} */
-const byId = (id) => /** @type {T} */ (document.getElementById(id));
-
 let sites = /** @type {Summary[]} */ ([]);
 let timer = 0;
 

@@ -12,11 +12,9 @@ import { remember, remembered, takeFromAddress } from "./link.js";
 import { phyphoxCode, phyphoxLink } from "./phyphox.js";
 import { hasSerial } from "./serial.js";
 import { ThisTag } from "./tag.js";
+import { byId } from "../page/parts.js";
 
 const SHOW_MS = 250;
-
-/** @template {HTMLElement} T @param {string} id @returns {T} */
-const byId = (id) => /** @type {T} */ (document.getElementById(id));
 
 let tag = /** @type {ThisTag | null} */ (null);
 

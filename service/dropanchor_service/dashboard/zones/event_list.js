@@ -3,6 +3,7 @@
 import { retractedBy } from "./event_log.js";
 import { clock, probability, sentence, why } from "./words.js";
 import { t } from "../i18n/language.js";
+import { write } from "../page/parts.js";
 
 /** @typedef {import("./words.js").ServiceEvent} ServiceEvent */
 
@@ -68,8 +69,3 @@ export class EventList {
 
 /** @param {string} name @param {string} text */
 const element = (name, text) => Object.assign(document.createElement(name), { textContent: text });
-
-/** @param {HTMLElement} target @param {string} text */
-function write(target, text) {
-  if (target.textContent !== text) target.textContent = text;
-}

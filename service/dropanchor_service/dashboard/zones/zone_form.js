@@ -2,6 +2,7 @@
 
 import { t } from "../i18n/language.js";
 import { readMeasure, writeMeasure } from "../data/units.js";
+import { fieldOf, partOf, writeOrHide } from "../page/parts.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone */
 
@@ -22,79 +23,69 @@ export class ZoneForm {
     });
     form.addEventListener("reset", () => editor.close());
     form.addEventListener("input", () => editor.change(this.#values()));
-    this.#part("corner").addEventListener("click", addCorner);
-    this.#part("newer").addEventListener("click", () => editor.zone && editor.open(editor.zone.id));
-    this.#part("delete").addEventListener("click", () => this.#ask(true));
-    this.#part("keep").addEventListener("click", () => this.#ask(false));
-    this.#part("delete-now").addEventListener("click", () => editor.remove());
+    partOf(this.form, "corner").addEventListener("click", addCorner);
+    partOf(this.form, "newer").addEventListener("click", () => editor.zone && editor.open(editor.zone.id));
+    partOf(this.form, "delete").addEventListener("click", () => this.#ask(true));
+    partOf(this.form, "keep").addEventListener("click", () => this.#ask(false));
+    partOf(this.form, "delete-now").addEventListener("click", () => editor.remove());
     editor.addEventListener("change", () => this.update());
   }
 
   update() {
     const { zone, problem, conflict, isNew, revision } = this.editor;
     this.form.hidden = zone === null;
-    const isNews = problem !== "" && problem !== this.#part("problem").textContent;
-    put(this.#part("problem"), problem);
-    if (isNews) this.#part("problem").scrollIntoView({ block: "nearest" });
-    this.#part("newer").hidden = !conflict || isNew;
+    const isNews = problem !== "" && problem !== partOf(this.form, "problem").textContent;
+    writeOrHide(partOf(this.form, "problem"), problem);
+    if (isNews) partOf(this.form, "problem").scrollIntoView({ block: "nearest" });
+    partOf(this.form, "newer").hidden = !conflict || isNew;
     const key = zone === null ? "" : `${isNew} ${zone.id} ${revision}`;
     this.#isFresh = key !== this.#shown;
-    if (this.#isFresh) this.#part("question").hidden = true;
+    if (this.#isFresh) partOf(this.form, "question").hidden = true;
     if (zone) this.#show(zone);
-    if (zone && this.#isFresh) this.#field("name").focus();
+    if (zone && this.#isFresh) fieldOf(this.form, "name").focus();
     this.#shown = key;
-  }
-
-  /** @param {string} name @returns {HTMLElement} */
-  #part(name) {
-    return /** @type {HTMLElement} */ (this.form.querySelector(`[data-part="${name}"]`));
-  }
-
-  /** @param {string} name */
-  #field(name) {
-    return /** @type {HTMLInputElement} */ (this.form.elements.namedItem(name));
   }
 
   /** @param {Zone} zone */
   #show(zone) {
     const { shape } = zone;
     const isCircle = shape.type === "circle";
-    put(this.#part("title"), this.editor.isNew ? t(`zone.new_${shape.type}`) : t("zone.title", { zone: zone.name || zone.id }));
-    put(this.#part("how"), isCircle ? circleHelp(this.editor.drawing) : polygonHelp(shape.points.length, this.editor.drawing));
-    this.#part("radius").hidden = !isCircle;
-    this.#part("corner").hidden = isCircle;
-    this.#part("delete").hidden = this.editor.isNew || !this.editor.store.isAdmin;
-    for (const name of /** @type {const} */ (["enter", "exit"])) this.#field(name).checked = zone[name];
+    writeOrHide(partOf(this.form, "title"), this.editor.isNew ? t(`zone.new_${shape.type}`) : t("zone.title", { zone: zone.name || zone.id }));
+    writeOrHide(partOf(this.form, "how"), isCircle ? circleHelp(this.editor.drawing) : polygonHelp(shape.points.length, this.editor.drawing));
+    partOf(this.form, "radius").hidden = !isCircle;
+    partOf(this.form, "corner").hidden = isCircle;
+    partOf(this.form, "delete").hidden = this.editor.isNew || !this.editor.store.isAdmin;
+    for (const name of /** @type {const} */ (["enter", "exit"])) fieldOf(this.form, name).checked = zone[name];
     for (const name of /** @type {const} */ (["tags", "groups"])) this.#fill(name, zone[name].join(", "));
     for (const name of /** @type {const} */ (["name", "colour", "dwell_s", "delay_s"])) this.#fill(name, String(zone[name] ?? ""));
-    this.#field("radius_m").disabled = !isCircle;
+    fieldOf(this.form, "radius_m").disabled = !isCircle;
     this.#measure("radius_m", isCircle ? shape.radius_m : null);
     for (const name of MEASURES) this.#measure(name, zone[name]);
   }
 
   /** Write a value, but not over what is being typed. @param {string} name @param {string} value */
   #fill(name, value) {
-    const field = this.#field(name);
+    const field = fieldOf(this.form, name);
     if ((field !== document.activeElement || this.#isFresh) && field.value !== value) field.value = value;
   }
 
   /** @param {string} name @param {number | null} value in SI units */
   #measure(name, value) {
-    if (this.#field(name) !== document.activeElement || this.#isFresh) writeMeasure(this.#field(name), value);
+    if (fieldOf(this.form, name) !== document.activeElement || this.#isFresh) writeMeasure(fieldOf(this.form, name), value);
   }
 
   /** @returns {Partial<Zone>} */
   #values() {
-    const number = (/** @type {string} */ name) => (this.#field(name).value === "" ? null : this.#field(name).valueAsNumber);
+    const number = (/** @type {string} */ name) => (fieldOf(this.form, name).value === "" ? null : fieldOf(this.form, name).valueAsNumber);
     const list = (/** @type {string} */ name, /** @type {RegExp} */ separator) =>
-      this.#field(name).value.trim().split(separator).filter((part) => part !== "");
+      fieldOf(this.form, name).value.trim().split(separator).filter((part) => part !== "");
     const shape = /** @type {Zone} */ (this.editor.zone).shape;
-    const radius_m = readMeasure(this.#field("radius_m"));
+    const radius_m = readMeasure(fieldOf(this.form, "radius_m"));
     return {
-      name: this.#field("name").value, colour: this.#field("colour").value,
-      enter: this.#field("enter").checked, exit: this.#field("exit").checked,
+      name: fieldOf(this.form, "name").value, colour: fieldOf(this.form, "colour").value,
+      enter: fieldOf(this.form, "enter").checked, exit: fieldOf(this.form, "exit").checked,
       dwell_s: number("dwell_s"), delay_s: number("delay_s") ?? 1,
-      ...Object.fromEntries(MEASURES.map((name) => [name, readMeasure(this.#field(name))])),
+      ...Object.fromEntries(MEASURES.map((name) => [name, readMeasure(fieldOf(this.form, name))])),
       tags: list("tags", /[\s,]+/), groups: list("groups", /\s*,\s*/),
       shape: shape.type === "circle" && radius_m !== null ? { ...shape, radius_m } : shape,
     };
@@ -102,8 +93,8 @@ export class ZoneForm {
 
   /** @param {boolean} asking */
   #ask(asking) {
-    this.#part("question").hidden = !asking;
-    this.#part(asking ? "delete-now" : "delete").focus();
+    partOf(this.form, "question").hidden = !asking;
+    partOf(this.form, asking ? "delete-now" : "delete").focus();
   }
 }
 
@@ -115,9 +106,3 @@ function polygonHelp(corners, drawing) {
 
 /** @param {boolean} drawing */
 const circleHelp = (drawing) => t(drawing ? "zone.draw_circle" : "zone.edit_circle");
-
-/** @param {HTMLElement} target @param {string} text */
-function put(target, text) {
-  if (target.textContent !== text) target.textContent = text;
-  target.hidden = text === "";
-}

@@ -1,6 +1,7 @@
 /** The list of zones: how many tags are in each, and a button that edits it. */
 
 import { count, t } from "../i18n/language.js";
+import { write } from "../page/parts.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone */
 
@@ -56,9 +57,4 @@ export class ZoneList {
     button.addEventListener("click", act);
     return button;
   }
-}
-
-/** @param {HTMLElement} target @param {string} text */
-function write(target, text) {
-  if (target.textContent !== text) target.textContent = text;
 }

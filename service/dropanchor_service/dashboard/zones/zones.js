@@ -12,6 +12,7 @@ import { ZoneForm } from "./zone_form.js";
 import { ZoneList } from "./zone_list.js";
 import { ZoneStore } from "./zone_store.js";
 import { t } from "../i18n/language.js";
+import { byId } from "../page/parts.js";
 
 const PADDING_PX = 64;
 const MIN_SIDE_M = 2;
@@ -19,9 +20,6 @@ const MIN_SIDE_M = 2;
 const NEW_PX = 80;
 /** Between two requests for the number of tags inside, however many events there are. */
 const REFRESH_MS = 500;
-
-/** @template {HTMLElement} T @param {string} id @returns {T} */
-const byId = (id) => /** @type {T} */ (document.getElementById(id));
 
 export class Zones {
   store = new ZoneStore();
