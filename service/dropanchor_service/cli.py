@@ -64,6 +64,7 @@ _EXTRAS = {
 }
 _EXTRA_IS_MISSING = """\
 This needs the extra '{0}': pip install 'dropanchor-service[{0}]' (in a clone: make install)"""
+EXIT_ERROR = 2
 _EPILOG = """\
 examples:
   dropanchor demo                          run the service with simulated tags and watch them in a browser
@@ -83,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if error.name not in _EXTRAS:
             raise
         print(_EXTRA_IS_MISSING.format(_EXTRAS[error.name]), file=sys.stderr)
-        return 2
+        return EXIT_ERROR
 
 
 def _run(arguments: Sequence[str] | None) -> int:
@@ -92,13 +93,17 @@ def _run(arguments: Sequence[str] | None) -> int:
     if chosen.command == "completion":
         print(completion_script(_parser([name for name in _COMMANDS if _is_installed(name)]), chosen.shell))
         return 0
-    return int(chosen.run(chosen))
+    try:
+        return int(chosen.run(chosen) or 0)
+    except chosen.refused as error:
+        print(f"dropanchor {chosen.command}: {error}", file=sys.stderr)
+        return EXIT_ERROR
 
 
 def _parser(chosen: Container[str], words: Sequence[str] = ()) -> Parser:
     """Return the parser of the whole command line. Only the chosen commands get their options and are imported.
 
-    words: the command line.
+    words: the command line. A command raises one of its REFUSED for what a person has to mend.
     """
     parser = Parser("dropanchor", description=_DESCRIPTION, epilog=_EPILOG)
     parser.add_argument("--version", action=_Version, help="print the version and exit")
@@ -111,7 +116,7 @@ def _parser(chosen: Container[str], words: Sequence[str] = ()) -> Parser:
             one.description, one.epilog = command.DESCRIPTION, command.EPILOG
             command.add_arguments(one)
             explain_actions(one)
-            one.set_defaults(run=command.run)
+            one.set_defaults(run=command.run, refused=getattr(command, "REFUSED", ()))
     add_completion_arguments(commands.add_parser("completion", help=COMPLETION), "dropanchor")
     return parser
 

@@ -1,7 +1,6 @@
 """`dropanchor api`: run an API node of a cluster until it is stopped."""
 
 import argparse
-import sys
 from pathlib import Path
 
 from dropanchor_service.api.http.server import ListenError
@@ -22,7 +21,7 @@ examples:
   dropanchor api --config yard.toml --port 8090
   dropanchor api --url postgresql://dropanchor@db.example/dropanchor --node-secret /etc/dropanchor/node.secret
 """
-EXIT_ERROR = 2
+REFUSED = (SettingsError, ListenError)
 EXIT_DIED = 1
 
 
@@ -39,18 +38,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the node. Return 0 if it was stopped, 1 if it died, 2 if it could not start."""
+    """Run the node. Return 0 if it was stopped, 1 if it died. Raises REFUSED if it cannot start."""
     logs.configure(arguments.log_level)
     open_files.raise_limit()
     systemd = Systemd()
-    try:
-        with interrupts() as interrupt, Node(_settings_of(arguments)) as node:
-            systemd.ready()
-            stopped = interrupt.wait(lambda: _supervise(node, systemd))
-            systemd.stopping()
-    except (SettingsError, ListenError) as error:
-        sys.stderr.write(f"dropanchor api: {error}\n")
-        return EXIT_ERROR
+    with interrupts() as interrupt, Node(_settings_of(arguments)) as node:
+        systemd.ready()
+        stopped = interrupt.wait(lambda: _supervise(node, systemd))
+        systemd.stopping()
     return 0 if stopped else EXIT_DIED
 
 

@@ -22,7 +22,7 @@ examples:
   dropanchor restore /mnt/backups/yard-monday data
 """
 EXIT_DAMAGED = 1
-EXIT_ERROR = 2
+REFUSED = (BackupError, SettingsError, OSError)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,22 +46,18 @@ def add_place(parser: argparse.ArgumentParser, towards: str) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Make a backup. Return 0, 1 if something in it is damaged, or 2 if there is none."""
+    """Make a backup. Return 0, or 1 if something in it is damaged. Raises REFUSED if there is none."""
     os.umask(0o077)  # it holds keys and secrets
-    try:
-        settings = settings_at(arguments.place)
-        folders = folders_at(arguments.place, settings)
-        missing = [str(folder) for folder in folders.values() if not folder.is_dir()]
-        if missing:
-            raise BackupError(f"{', '.join(missing)}: no such folder")
-        files = {} if settings is None else {SETTINGS: arguments.place}
-        target = arguments.target if arguments.keep is None else dated(arguments.target)
-        damaged = back_up({**folders, **files}, target)
-        if arguments.keep is not None and not damaged:
-            drop_oldest(arguments.target, arguments.keep)
-    except (BackupError, SettingsError, OSError) as error:
-        sys.stderr.write(f"dropanchor backup: {error}\n")
-        return EXIT_ERROR
+    settings = settings_at(arguments.place)
+    folders = folders_at(arguments.place, settings)
+    missing = [str(folder) for folder in folders.values() if not folder.is_dir()]
+    if missing:
+        raise BackupError(f"{', '.join(missing)}: no such folder")
+    files = {} if settings is None else {SETTINGS: arguments.place}
+    target = arguments.target if arguments.keep is None else dated(arguments.target)
+    damaged = back_up({**folders, **files}, target)
+    if arguments.keep is not None and not damaged:
+        drop_oldest(arguments.target, arguments.keep)
     print(f"{target} holds {', '.join([*folders, *files])}; every file was read again")
     for url in _databases(settings):
         print(f"what is in PostgreSQL is not in this backup: pg_dump --format custom --file FILE {url}")

@@ -37,7 +37,7 @@ examples:
   dropanchor demo --recording plaza2
   dropanchor demo --tags 20 --port 8081 --zenoh-listen tcp/127.0.0.1:7448
 """
-EXIT_ERROR = 2
+REFUSED = (SettingsError, ListenError, ZenohError, RecordingError)
 EXIT_DIED = 1
 START_STD_M = 0.1
 STOP_TIMEOUT_S = 1.0
@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the demo. Return 0 if it was stopped, 1 if a part of it died, 2 if it could not start."""
+    """Run the demo. Return 0 if it was stopped, 1 if a part of it died. Raises REFUSED if it cannot start."""
     logs.configure(arguments.log_level)
     try:
         with (
@@ -75,9 +75,6 @@ def run(arguments: argparse.Namespace) -> int:
             stopped = interrupt.wait(lambda: tags.poll() in (None, 0) and not service.has_died)
     except KeyboardInterrupt:
         return 0
-    except (SettingsError, ListenError, ZenohError, RecordingError) as error:
-        sys.stderr.write(f"dropanchor demo: {error}\n")
-        return EXIT_ERROR
     if not stopped:
         sys.stderr.write("dropanchor demo: the simulated tags or the service ended by themselves; see the log above\n")
     return 0 if stopped else EXIT_DIED

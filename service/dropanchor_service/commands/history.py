@@ -27,7 +27,7 @@ how:
   2. run the command, with --site if the site has an id
   3. when the page shows the past as before, delete the file
 """
-EXIT_ERROR = 2
+REFUSED = (HistoryError, SettingsError)
 EXIT_STOPPED = 130
 DEFAULT_SITE = "default"
 
@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Move a history. Return 0, 2 on an error, or 130 if it was stopped."""
+    """Move a history. Return 0, or 130 if it was stopped. Raises REFUSED."""
     to = {"url": arguments.url, "password_file": arguments.password_file}
     try:
         settings = load_settings(None, {"history": {name: each for name, each in to.items() if each is not None}}, {})
@@ -52,9 +52,6 @@ def run(arguments: argparse.Namespace) -> int:
             _move(HistoryFile(arguments.file), database, arguments.site, retention_of(settings.history))
         finally:
             database.close()
-    except (HistoryError, SettingsError) as error:
-        sys.stderr.write(f"dropanchor history: {error}\n")
-        return EXIT_ERROR
     except KeyboardInterrupt:
         sys.stderr.write("\ndropanchor history: stopped. Run it again to go on.\n")
         return EXIT_STOPPED

@@ -56,7 +56,8 @@ examples:
   dropanchor import phone.zip uwb.csv --out recordings/walk
   dropanchor replay recordings/drive
 """
-EXIT_ERROR, EXIT_STOPPED = 2, 130
+REFUSED = (ImportingError, ValueError, OSError)
+EXIT_STOPPED = 130
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -112,12 +113,9 @@ def _add_topics(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Import the sources. Return 0 on success, 2 if something is unusable, 130 on Ctrl-C."""
+    """Import the sources. Return 0, or 130 on Ctrl-C. Raises REFUSED."""
     try:
         _import(arguments)
-    except (ImportingError, ValueError, OSError) as error:
-        print(f"dropanchor import: {error}", file=sys.stderr)
-        return EXIT_ERROR
     except KeyboardInterrupt:
         print("stopped: nothing was written", file=sys.stderr)
         return EXIT_STOPPED

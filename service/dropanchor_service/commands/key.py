@@ -29,7 +29,7 @@ examples:
   dropanchor key revoke dashboard
   curl --cacert security/ca.pem -H "Authorization: Bearer $KEY" https://localhost:8080/api/v1/poses
 """
-EXIT_ERROR = 2
+REFUSED = (SecurityError, ApiKeyError, OSError)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,17 +52,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         add_folder_option(action)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the action. Return 0, or 2 on an error."""
-    try:
-        folder = SecurityFolder.open(arguments.security)
-        _refuse_site(folder, arguments)
-        keys = ApiKeys(folder.path)
-        {"add": _add, "revoke": _revoke, "list": _list}[arguments.action](keys, arguments)
-    except (SecurityError, ApiKeyError, OSError) as error:
-        sys.stderr.write(f"dropanchor key: {error}\n")
-        return EXIT_ERROR
-    return 0
+def run(arguments: argparse.Namespace) -> None:
+    """Run the action. Raises REFUSED."""
+    folder = SecurityFolder.open(arguments.security)
+    _refuse_site(folder, arguments)
+    keys = ApiKeys(folder.path)
+    {"add": _add, "revoke": _revoke, "list": _list}[arguments.action](keys, arguments)
 
 
 def _refuse_site(folder: SecurityFolder, arguments: argparse.Namespace) -> None:

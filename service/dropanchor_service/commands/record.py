@@ -2,7 +2,6 @@
 
 import argparse
 import shutil
-import sys
 from pathlib import Path
 from urllib.parse import quote
 
@@ -21,7 +20,7 @@ examples:
   dropanchor record list
   dropanchor record fetch yard-20270115T080000-000000Z.mcap
 """
-EXIT_ERROR = 2
+REFUSED = (RefusedError, OSError)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,14 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         add_rest_options(action)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the action. Return 0, or 2 on an error."""
-    try:
-        {"start": _start, "stop": _stop, "list": _list, "fetch": _fetch}[arguments.action](arguments)
-    except (RefusedError, OSError) as error:
-        sys.stderr.write(f"dropanchor record: {error}\n")
-        return EXIT_ERROR
-    return 0
+def run(arguments: argparse.Namespace) -> None:
+    """Run the action. Raises REFUSED."""
+    {"start": _start, "stop": _stop, "list": _list, "fetch": _fetch}[arguments.action](arguments)
 
 
 def _start(arguments: argparse.Namespace) -> None:

@@ -2,10 +2,9 @@
 
 import argparse
 import os
-import sys
 from pathlib import Path
 
-from dropanchor_service.commands.backup import EXIT_ERROR, add_place, folders_at, settings_at
+from dropanchor_service.commands.backup import add_place, folders_at, settings_at
 from dropanchor_service.commands.backup_files import BackupError, restore
 from dropanchor_service.settings.sources import SettingsError
 
@@ -20,20 +19,17 @@ examples:
   dropanchor restore /mnt/backups/20261128T031500Z /etc/dropanchor/dropanchor.toml
 """
 
+REFUSED = (BackupError, SettingsError, OSError)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("backup", metavar="BACKUP", type=Path, help="folder that `dropanchor backup` made")
     add_place(parser, "to")
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Restore a backup. Return 0, or 2 on an error."""
+def run(arguments: argparse.Namespace) -> None:
+    """Restore a backup. Raises REFUSED."""
     os.umask(0o077)
-    try:
-        folders = folders_at(arguments.place, settings_at(arguments.place))
-        restore(arguments.backup, folders)
-    except (BackupError, SettingsError, OSError) as error:
-        sys.stderr.write(f"dropanchor restore: {error}\n")
-        return EXIT_ERROR
+    folders = folders_at(arguments.place, settings_at(arguments.place))
+    restore(arguments.backup, folders)
     print("restored: " + ", ".join(f"{name} to {folder}" for name, folder in folders.items()))
-    return 0

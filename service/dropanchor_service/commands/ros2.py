@@ -45,7 +45,7 @@ examples:
   dropanchor ros2 --tag cart --namespace cart/dropanchor --child-frame cart/base_link     poses only
   dropanchor ros2 --credentials cart/ --url https://yard.example:8080 --ros-connect tcp/127.0.0.1:7447
 """
-EXIT_ERROR = 2
+REFUSED = (ConnectError, ValueError, OSError)
 
 Json = Mapping[str, Any]
 
@@ -95,25 +95,18 @@ def _add_sensors(ros: argparse._ArgumentGroup) -> None:
     ros.add_argument("--pressure", type=_topic, metavar="TOPIC", help="read sensor_msgs/FluidPressure from this topic")
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Bridge until Ctrl-C or SIGTERM. Return 0, or 2 on an error."""
-    try:
-        apply_defaults(arguments)
-        if arguments.tag is None:
-            raise ValueError("which tag is the robot? --tag says so, or --credentials")
-        mounted = mounting(arguments.forward, arguments.up)
-        _say(f"connecting to the router of the ROS nodes at {arguments.ros_connect} (--ros-connect)")
-        with ExitStack() as stack:
-            node = RosNode(
-                stack.enter_context(opened_session(_ros_options(arguments))).session, arguments.domain, _NODE
-            )
-            reads = arguments.imu or arguments.range or arguments.pressure
-            client = stack.enter_context(opened_client(arguments, arguments.tag)) if reads else None
-            _bridge(arguments, node, client, mounted)
-    except (ConnectError, ValueError, OSError) as error:
-        _say(str(error))
-        return EXIT_ERROR
-    return 0
+def run(arguments: argparse.Namespace) -> None:
+    """Bridge until Ctrl-C or SIGTERM. Raises REFUSED."""
+    apply_defaults(arguments)
+    if arguments.tag is None:
+        raise ValueError("which tag is the robot? --tag says so, or --credentials")
+    mounted = mounting(arguments.forward, arguments.up)
+    _say(f"connecting to the router of the ROS nodes at {arguments.ros_connect} (--ros-connect)")
+    with ExitStack() as stack:
+        node = RosNode(stack.enter_context(opened_session(_ros_options(arguments))).session, arguments.domain, _NODE)
+        reads = arguments.imu or arguments.range or arguments.pressure
+        client = stack.enter_context(opened_client(arguments, arguments.tag)) if reads else None
+        _bridge(arguments, node, client, mounted)
 
 
 def _ros_options(arguments: argparse.Namespace) -> argparse.Namespace:

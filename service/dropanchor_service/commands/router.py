@@ -2,7 +2,6 @@
 
 import argparse
 import logging
-import sys
 
 from dropanchor_service.commands.options import add_log_option, add_security_options, router_settings
 from dropanchor_service.runtime import logs, open_files
@@ -24,6 +23,7 @@ examples:
   dropanchor router --security security                    with certificates and access control
 """
 
+REFUSED = (SettingsError, ZenohError)
 _log = logging.getLogger(__name__)
 
 
@@ -35,21 +35,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_log_option(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the router. Return 0 if it was stopped, 2 if it could not start."""
+def run(arguments: argparse.Namespace) -> None:
+    """Run the router until it is stopped. Raises REFUSED if it cannot start."""
     logs.configure(arguments.log_level)
     open_files.raise_limit()
-    try:
-        settings = router_settings(arguments)
-        credentials = credentials_of(settings)
-        refuse_exposure(settings, credentials)
-        with interrupts() as interrupt, open_session(settings.zenoh, credentials):
-            _say_what_is_used(settings.zenoh, credentials)
-            interrupt.wait(lambda: True)
-    except (SettingsError, ZenohError) as error:
-        sys.stderr.write(f"dropanchor router: {error}\n")
-        return 2
-    return 0
+    settings = router_settings(arguments)
+    credentials = credentials_of(settings)
+    refuse_exposure(settings, credentials)
+    with interrupts() as interrupt, open_session(settings.zenoh, credentials):
+        _say_what_is_used(settings.zenoh, credentials)
+        interrupt.wait(lambda: True)
 
 
 def _say_what_is_used(settings: ZenohSettings, credentials: SecurityFolder | None) -> None:

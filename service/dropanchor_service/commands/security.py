@@ -4,7 +4,6 @@ import argparse
 import ipaddress
 import re
 import socket
-import sys
 from pathlib import Path
 
 from dropanchor_schemas.file_names import file_name_of
@@ -28,7 +27,7 @@ examples:
 """
 FOLDER = Path("security")
 DAYS = 730
-EXIT_ERROR = 2
+REFUSED = (SecurityError, InvalidKeyError, OSError)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -85,14 +84,9 @@ def add_days_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the action. Return 0, or 2 on an error."""
-    try:
-        {"init": _init, "renew": _renew, "add-site": _add_site}[arguments.action](arguments)
-    except (SecurityError, InvalidKeyError, OSError) as error:
-        sys.stderr.write(f"dropanchor security: {error}\n")
-        return EXIT_ERROR
-    return 0
+def run(arguments: argparse.Namespace) -> None:
+    """Run the action. Raises REFUSED."""
+    {"init": _init, "renew": _renew, "add-site": _add_site}[arguments.action](arguments)
 
 
 def _init(arguments: argparse.Namespace) -> None:

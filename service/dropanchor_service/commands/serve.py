@@ -48,7 +48,7 @@ a settings file:
 
 _log = logging.getLogger(__name__)
 
-EXIT_ERROR = 2
+REFUSED = (SettingsError, ListenError, ZenohError)
 EXIT_DIED = 1
 EXIT_GONE = 75  # EX_TEMPFAIL of sysexits.h: another process serves the sites, and a restart begins as a standby
 
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the service. Return 0 if it was stopped, 1 if it died, 2 if it could not start, 75 if another took over."""
+    """Run the service. Return 0 if it was stopped, 1 if it died, 75 if another took over. Raises REFUSED."""
     logs.configure(arguments.log_level)
     prepare_to_serve()
     systemd = Systemd()
@@ -79,9 +79,6 @@ def run(arguments: argparse.Namespace) -> int:
             systemd.stopping()
     except KeyboardInterrupt:
         return 0
-    except (SettingsError, ListenError, ZenohError) as error:
-        sys.stderr.write(f"dropanchor serve: {error}\n")
-        return EXIT_ERROR
     if not stopped and service.gone:
         sys.stderr.write(f"dropanchor serve: {service.gone}. Started again, this process is a standby\n")
         return EXIT_GONE

@@ -26,7 +26,7 @@ examples:
   dropanchor settings --show --config yard.toml --set-only
   dropanchor settings --show --config yard.toml --json | jq '.settings[] | select(.source == "rest")'
 """
-EXIT_ERROR = 2
+REFUSED = (SettingsError,)
 _OF_SITES = ("site", "tags", "tag_defaults", "sites")
 _WORDS = {"rest": "set over REST", "first_range": "the anchor of the first range"}
 
@@ -38,21 +38,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_service_options(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Show the settings. Return 0, or 2 on an error."""
-    try:
-        settings = settings_of(arguments)
-        shown = dict(_all(settings))
-    except SettingsError as error:
-        sys.stderr.write(f"dropanchor settings: {error}\n")
-        return EXIT_ERROR
+def run(arguments: argparse.Namespace) -> None:
+    """Show the settings. Raises REFUSED."""
+    settings = settings_of(arguments)
+    shown = dict(_all(settings))
     if settings.cluster.url is not None:
         sys.stderr.write("What was set over REST is in the database of the cluster: GET /api/v1/settings shows it.\n")
     if arguments.set_only:
         shown = {site: [one for one in values if one.source != "default"] for site, values in shown.items()}
     with suppress(BrokenPipeError):
         print(_json(shown) if arguments.json else "\n".join(_lines(shown)))
-    return 0
 
 
 def _all(settings: Settings) -> Iterator[tuple[str | None, list[SettingValue]]]:

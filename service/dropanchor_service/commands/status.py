@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import sys
 from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Any
@@ -23,7 +22,7 @@ examples:
   dropanchor status --site north --json
 """
 EXIT_UNHEALTHY = 1
-EXIT_ERROR = 2
+REFUSED = (RefusedError,)
 _EVENTS = 5
 _OF_SITE = {
     "tags": ("tags", "/tags"),
@@ -42,12 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the status. Return 0 for a healthy service, 1 for another, or 2 if none answers."""
-    try:
-        found = _found(arguments)
-    except RefusedError as error:
-        sys.stderr.write(f"dropanchor status: {error}\n")
-        return EXIT_ERROR
+    """Print the status. Return 0 for a healthy service, 1 for another. Raises REFUSED if none answers."""
+    found = _found(arguments)
     print(json.dumps(found, indent=2) if arguments.json else "\n".join(_lines(found)))
     return 0 if found["healthy"] else EXIT_UNHEALTHY
 

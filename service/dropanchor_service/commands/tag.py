@@ -1,7 +1,6 @@
 """`dropanchor tag`: issue and revoke the certificates of tags."""
 
 import argparse
-import sys
 from pathlib import Path
 
 from dropanchor_schemas.keys import InvalidKeyError
@@ -20,7 +19,7 @@ examples:
   dropanchor tag revoke forklift-7
   dropanchor tag list
 """
-EXIT_ERROR = 2
+REFUSED = (SecurityError, InvalidKeyError, OSError)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,15 +37,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         add_folder_option(action)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the action. Return 0, or 2 on an error."""
-    try:
-        folder = SecurityFolder.open(arguments.security)
-        {"add": _add, "revoke": _revoke, "list": _list}[arguments.action](folder, arguments)
-    except (SecurityError, InvalidKeyError, OSError) as error:
-        sys.stderr.write(f"dropanchor tag: {error}\n")
-        return EXIT_ERROR
-    return 0
+def run(arguments: argparse.Namespace) -> None:
+    """Run the action. Raises REFUSED."""
+    folder = SecurityFolder.open(arguments.security)
+    {"add": _add, "revoke": _revoke, "list": _list}[arguments.action](folder, arguments)
 
 
 def _add(folder: SecurityFolder, arguments: argparse.Namespace) -> None:
