@@ -8,7 +8,6 @@ from contextlib import ExitStack
 from itertools import islice
 from pathlib import Path
 from threading import Event, Thread
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -89,9 +88,7 @@ class LiveTags:
         self._booted_ns = self._t0_ns - 1_800_000_000_000 if self._boot_clock else 0
         self._thread.start()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

@@ -5,7 +5,6 @@ import logging
 from collections.abc import AsyncIterator, Sequence
 from contextlib import ExitStack, asynccontextmanager, suppress
 from threading import Event
-from types import TracebackType
 from typing import Self
 
 from fastapi import FastAPI
@@ -79,9 +78,7 @@ class Node:
         _log.info("ready at %s, for the owners in the table of leases", self.url)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stopping.set()
         self._opened.close()
         _log.info("stopped")

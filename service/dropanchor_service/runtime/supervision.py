@@ -2,7 +2,6 @@
 
 import logging
 import threading
-from types import TracebackType
 from typing import Self
 
 _log = logging.getLogger(__name__)
@@ -23,9 +22,7 @@ class Supervision:
         threading.excepthook = self._on_error
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         threading.excepthook = self._before
 
     def _on_error(self, died: threading.ExceptHookArgs) -> None:

@@ -7,7 +7,6 @@ wait 5 ms for it while another thread computes. Live messages would then queue i
 import logging
 import threading
 import time
-from types import TracebackType
 from typing import Any, Self
 
 import zenoh
@@ -87,9 +86,7 @@ class ZenohIntake:
         self._caches.start(self._catch_up)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._caches.stop()
         for declared in self._declared:
             declared.undeclare()

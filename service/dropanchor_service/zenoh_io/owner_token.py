@@ -1,7 +1,6 @@
 """The liveliness token of the owner of a bucket, and those of other owners."""
 
 from collections.abc import Callable
-from types import TracebackType
 from typing import Any, Self
 
 import zenoh
@@ -35,9 +34,7 @@ class ZenohOwner:
         key = keys.owner_key(self._bucket, self._epoch)
         self._declared.append(self._session.liveliness().declare_token(key))
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for declared in self._declared:
             declared.undeclare()
 

@@ -1,7 +1,6 @@
 """Publishes poses over Zenoh while somebody subscribes: each tag's pose on change, and one frame of a site's poses."""
 
 import time
-from types import TracebackType
 from typing import Self
 
 import zenoh
@@ -61,10 +60,8 @@ class ZenohPoses(PeriodicPublisher):
             self._tag_version, self._is_matched = self._sites.latest.version, True
         self.wake()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        super().__exit__(kind, error, traceback)
+    def __exit__(self, *raised: object) -> None:
+        super().__exit__(*raised)
         for listener in self._listeners:
             listener.undeclare()
         for publisher in (self._tag_publisher, self._frame_publisher, *self._of_site.values()):

@@ -6,7 +6,6 @@ A queryable that raises leaves its client without any reply, so every unexpected
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from types import TracebackType
 from typing import Any, Self
 
 import zenoh
@@ -66,9 +65,7 @@ class ZenohAnswers:
         site = self._sites.only.site.site.id
         return keys.all_tags(site, "pose"), keys.all_anchors(site), keys.all_tags(site, "settings")
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for declared in self._declared:
             declared.undeclare()
 

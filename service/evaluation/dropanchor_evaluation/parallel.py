@@ -4,7 +4,6 @@ import multiprocessing
 import multiprocessing.pool
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from types import TracebackType
 from typing import TypeVar
 
 Task = TypeVar("Task")
@@ -24,9 +23,7 @@ class Workers:
             self._pool = multiprocessing.get_context("spawn").Pool(self._processes, leave_interrupts_to_parent)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._pool is not None:
             self._pool.terminate()
             self._pool.join()
