@@ -2,25 +2,22 @@
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from dropanchor_schemas.models import Frozen
 from dropanchor_schemas.pose import Phrase, TrackingState
 from dropanchor_schemas.site import Anchor, Georeference, RemoteSettings, TagSettings
 from dropanchor_schemas.tag_health import Care, TagHealth
 
 
-class _Answer(BaseModel):
-    model_config = ConfigDict(frozen=True)
-
-
-class RemoteSettingsStatus(_Answer):
+class RemoteSettingsStatus(Frozen):
     """What the service has set for the program of a tag, and what the program says that it applies."""
 
     wanted: RemoteSettings
     acknowledged: RemoteSettings | None = Field(description="null: the program has acknowledged no settings.")
 
 
-class MotionOffset(_Answer):
+class MotionOffset(Frozen):
     """The same offset, from the turns and stops that the motion and the ranges of a moving tag both show.
 
     Delays of messages do not change it.
@@ -30,7 +27,7 @@ class MotionOffset(_Answer):
     uncertainty_s: float = Field(description="With 95 % probability, the offset lies within this much of it.")
 
 
-class ClockOffset(_Answer):
+class ClockOffset(Frozen):
     """How far the clock of a tag's motion is ahead of that of its ranges."""
 
     offset_s: float = Field(
@@ -44,7 +41,7 @@ class ClockOffset(_Answer):
     corrected: bool = Field(description="Whether the service moves the times of the motion by the offset.")
 
 
-class TagStatus(_Answer):
+class TagStatus(Frozen):
     """The status of one tag: when it last sent data, what was received from it, and its settings."""
 
     tag: str
@@ -94,7 +91,7 @@ class TimedTagStatus(TagStatus):
     last_heard_utc: str | None = Field(description="`last_heard_ns` as ISO 8601.")
 
 
-class ClientAccess(_Answer):
+class ClientAccess(Frozen):
     """What the client of this request may do."""
 
     scope: Literal["read", "write", "admin"] = Field(
@@ -102,20 +99,20 @@ class ClientAccess(_Answer):
     )
 
 
-class SamplesReceived(_Answer):
+class SamplesReceived(Frozen):
     """What was taken in. Admission, duplicates and the values of samples are judged later: see the tag's counters."""
 
     samples: int = Field(description="Samples in the payload.")
 
 
-class HealthReceived(_Answer):
+class HealthReceived(Frozen):
     """What was taken in of a tag's health. Whether the tag is admitted is judged later: see the tag's counters."""
 
     values: int = Field(description="Values that are used.")
     absurd: list[str] = Field(description="Names of values that are not used, because no tag can measure them.")
 
 
-class SamplesAcknowledged(_Answer):
+class SamplesAcknowledged(Frozen):
     """The answer to one message on the WebSocket for samples. The service has the samples; as with `SamplesReceived`,
     they are judged later."""
 
@@ -133,7 +130,7 @@ class SamplesAcknowledged(_Answer):
     hint_phrase: Phrase | None = Field(default=None, description="The hint by its code; null without one.")
 
 
-class PhoneReadingsReceived(_Answer):
+class PhoneReadingsReceived(Frozen):
     """What became of a batch of a phone's readings."""
 
     samples: int = Field(description="IMU samples that are complete with this batch.")
@@ -143,14 +140,14 @@ class PhoneReadingsReceived(_Answer):
     waiting: int = Field(description="Messages of this recording that wait for one that was sent before them.")
 
 
-class TagList(_Answer):
+class TagList(Frozen):
     """Every tag that has sent data or is configured."""
 
     t_ns: int = Field(description="UTC, ns: the time of the answer.")
     tags: list[TagStatus]
 
 
-class PendingTag(_Answer):
+class PendingTag(Frozen):
     """A tag that waits: it sends data, but the service has not admitted it."""
 
     tag: str
@@ -159,21 +156,21 @@ class PendingTag(_Answer):
     messages: int
 
 
-class PendingTagList(_Answer):
+class PendingTagList(Frozen):
     """The pending tags, most recently received first."""
 
     t_ns: int = Field(description="UTC, ns: the time of the answer.")
     tags: list[PendingTag]
 
 
-class NewcomerList(_Answer):
+class NewcomerList(Frozen):
     """The same under the former name, until the next version."""
 
     t_ns: int = Field(description="UTC, ns: the time of the answer.")
     newcomers: list[PendingTag]
 
 
-class SiteSummary(_Answer):
+class SiteSummary(Frozen):
     """A site that the service serves."""
 
     site: str = Field(description="Id of the site.")
@@ -186,7 +183,7 @@ class SiteSummary(_Answer):
     needs_care: int = Field(description="Number of its tags that need a person.")
 
 
-class SiteList(_Answer):
+class SiteList(Frozen):
     """All sites that the service serves."""
 
     sites: list[SiteSummary]
@@ -196,13 +193,13 @@ class SiteList(_Answer):
     )
 
 
-class AnchorList(_Answer):
+class AnchorList(Frozen):
     """The anchors of the site."""
 
     anchors: list[Anchor]
 
 
-class Connect(_Answer):
+class Connect(Frozen):
     """How a tag connects to this site."""
 
     endpoints: list[str] = Field(description="Endpoints of the Zenoh router, such as tcp/127.0.0.1:7447.")
@@ -213,7 +210,7 @@ class Connect(_Answer):
     )
 
 
-class Health(_Answer):
+class Health(Frozen):
     """Whether the service is live (it answers) or ready (it can process samples)."""
 
     status: str
@@ -226,7 +223,7 @@ class Health(_Answer):
     )
 
 
-class InvalidPart(_Answer):
+class InvalidPart(Frozen):
     """One error in a request."""
 
     location: str = Field(description="`body`, `query` or `path`, then the path to the value, joined by dots.")
@@ -234,7 +231,7 @@ class InvalidPart(_Answer):
     detail_phrase: Phrase | None = Field(default=None, description="The detail by its code; null: it has none.")
 
 
-class Problem(_Answer):
+class Problem(Frozen):
     """Problem details (RFC 9457)."""
 
     type: str = Field(description="A URI that stays the same for problems of the same kind.")

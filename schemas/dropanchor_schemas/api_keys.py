@@ -2,19 +2,18 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from dropanchor_schemas.keys import refuse_pattern
+from dropanchor_schemas.models import Exact, Frozen
 from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Id, Label
 
 KeyScope = Literal["read", "write"]
 
 
-class KeyRequest(BaseModel):
+class KeyRequest(Exact):
     """Who gets a key, and for what: a scope, or the samples of a tag."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: Annotated[Label, Field(min_length=1)] = Field(description="Of the person or program that gets it.")
     scope: KeyScope | None = Field(default=None, description="What it allows. A key for `admin` needs the command.")
@@ -30,10 +29,8 @@ class KeyRequest(BaseModel):
         return self
 
 
-class AccessKey(BaseModel):
+class AccessKey(Frozen):
     """A key, without its secret."""
-
-    model_config = ConfigDict(frozen=True)
 
     id: str
     name: str
@@ -49,10 +46,8 @@ class NewAccessKey(AccessKey):
     secret: str = Field(description="Works as a bearer token.")
 
 
-class AccessKeyList(BaseModel):
+class AccessKeyList(Frozen):
     """The keys of a site, but for those of administrators."""
-
-    model_config = ConfigDict(frozen=True)
 
     available: bool = Field(
         description="Whether keys can be created and revoked here. They need access control, without which nobody "

@@ -2,7 +2,9 @@
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from dropanchor_schemas.models import Frozen
 
 AuditKind = Literal[
     "site",
@@ -26,10 +28,8 @@ SECRET_KINDS = ("key", "share")
 """Kinds that administrators alone may read, as what they are about."""
 
 
-class Author(BaseModel):
+class Author(Frozen):
     """Who changed something."""
-
-    model_config = ConfigDict(frozen=True)
 
     source: Literal["key", "token", "local", "service"] = Field(
         description="local: somebody, without access control; service: the service itself, as with the anchor of the "
@@ -38,10 +38,8 @@ class Author(BaseModel):
     name: str = Field(description="The name of the key, or the subject of the token; otherwise empty.")
 
 
-class AuditEntry(BaseModel):
+class AuditEntry(Frozen):
     """A change."""
-
-    model_config = ConfigDict(frozen=True)
 
     number: int = Field(description="Its position in the trail. Numbers grow, and some are missing.")
     t_ns: int = Field(description="UTC, ns.")
@@ -55,10 +53,8 @@ class AuditEntry(BaseModel):
     )
 
 
-class AuditList(BaseModel):
+class AuditList(Frozen):
     """A page of the trail, the newest first."""
-
-    model_config = ConfigDict(frozen=True)
 
     entries: list[AuditEntry]
     next: int | None = Field(description="`before` of the next page; null: there is none.")

@@ -4,9 +4,10 @@ import re
 from enum import StrEnum
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import AfterValidator, BaseModel, Field, FiniteFloat
 
 from dropanchor_schemas.events import Event, EventType
+from dropanchor_schemas.models import Exact, Frozen
 from dropanchor_schemas.pose import Phrase
 from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Id, NumberOnly, StrictBool
@@ -51,9 +52,7 @@ class Language(StrEnum):
     GERMAN = "de"
 
 
-class _Destination(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
+class _Destination(Exact):
     id: Id = Field(description="Id of the destination, as in its path.")
     enabled: StrictBool = Field(default=True, description="Whether new events are queued for it.")
 
@@ -146,10 +145,8 @@ Destination = Annotated[
 ]
 
 
-class DestinationState(BaseModel):
+class DestinationState(Frozen):
     """A destination and its queue."""
-
-    model_config = ConfigDict(frozen=True)
 
     destination: Destination = Field(description="As it was put, but without its secret and the path of its URL.")
     has_secret: bool = Field(description="Whether the service knows the secret of a webhook.")
@@ -171,10 +168,8 @@ class DestinationList(BaseModel):
     )
 
 
-class ReceiverNetwork(BaseModel):
+class ReceiverNetwork(Frozen):
     """A network inside whose machines may receive events."""
-
-    model_config = ConfigDict(frozen=True)
 
     network: str = Field(description="The network, such as `192.168.1.0/24`.")
     in_settings: bool = Field(description="Whether the settings allow it, so that it cannot be removed here.")
@@ -186,19 +181,15 @@ class ReceiverNetworkList(BaseModel):
     networks: list[ReceiverNetwork]
 
 
-class DestinationTest(BaseModel):
+class DestinationTest(Frozen):
     """What became of a test event."""
-
-    model_config = ConfigDict(frozen=True)
 
     delivered: bool
     detail: str = Field(description="What the receiver answered, or why there is no answer.")
 
 
-class DeadLetter(BaseModel):
+class DeadLetter(Frozen):
     """An event that was not delivered, and why."""
-
-    model_config = ConfigDict(frozen=True)
 
     event: Event
     reason: str
@@ -210,9 +201,7 @@ class DeadLetterList(BaseModel):
     dead_letters: list[DeadLetter]
 
 
-class Retried(BaseModel):
+class Retried(Frozen):
     """How many dead letters went back to the queue."""
-
-    model_config = ConfigDict(frozen=True)
 
     retried: int

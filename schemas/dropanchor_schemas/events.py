@@ -3,7 +3,9 @@
 from enum import StrEnum
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from dropanchor_schemas.models import Frozen
 
 
 class EventType(StrEnum):
@@ -28,11 +30,7 @@ class RetractionReason(StrEnum):
     START_TAKEN_BACK = "start_taken_back"  # an operator took it back
 
 
-class _Answer(BaseModel):
-    model_config = ConfigDict(frozen=True)
-
-
-class EventData(_Answer):
+class EventData(Frozen):
     """What is known about the event. Fields that do not belong to its type are null."""
 
     t_ns: int = Field(description="UTC, ns: when the event was certain. `time` of the envelope is the same.")
@@ -63,7 +61,7 @@ class EventData(_Answer):
     )
 
 
-class Event(_Answer):
+class Event(Frozen):
     """An event in the JSON format of CloudEvents 1.0. `id` stays the same however often the event is delivered."""
 
     specversion: Literal["1.0"] = "1.0"
@@ -77,7 +75,7 @@ class Event(_Answer):
     data: EventData
 
 
-class EventList(_Answer):
+class EventList(Frozen):
     """One page of stored events, oldest first."""
 
     events: list[Event]

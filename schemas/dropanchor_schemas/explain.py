@@ -2,8 +2,9 @@
 
 from enum import StrEnum
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from dropanchor_schemas.models import Frozen
 from dropanchor_schemas.pose import Hypothesis, Phrase, Pose
 
 
@@ -14,11 +15,7 @@ class MeasurementKind(StrEnum):
     BEARING = "bearing"
 
 
-class _Answer(BaseModel):
-    model_config = ConfigDict(frozen=True)
-
-
-class Innovation(_Answer):
+class Innovation(Frozen):
     """One measurement, compared with the prediction of the most likely hypothesis."""
 
     t_ns: int
@@ -38,7 +35,7 @@ class Innovation(_Answer):
     fused: bool = Field(description="Whether it was fused; false if it was gated or is probably an outlier.")
 
 
-class SpeedEvidence(_Answer):
+class SpeedEvidence(Frozen):
     """Whether the ranges agree with the speed: the range rate equals the speed along the line of sight."""
 
     speed_mps: float | None
@@ -48,7 +45,7 @@ class SpeedEvidence(_Answer):
     predicted_range_rate_mps: float | None = Field(description="Slope of the predictions of the same ranges.")
 
 
-class RangeErrors(_Answer):
+class RangeErrors(Frozen):
     """How much the ranges of the tag scatter, as learned from them; never less than what was told."""
 
     white_m: float = Field(description="Standard deviation, m, of the error that is new in every range.")
@@ -66,7 +63,7 @@ class UncertaintyCause(StrEnum):
     HEIGHT = "height"
 
 
-class Uncertainty(_Answer):
+class Uncertainty(Frozen):
     """How far the tag may be from its pose along the 95 % ellipse, and what most of it comes from."""
 
     half_m: float = Field(description="The semi-major axis of the ellipse.")
@@ -76,21 +73,21 @@ class Uncertainty(_Answer):
     phrase: Phrase = Field(description="That sentence by its code.")
 
 
-class LearnedNorth(_Answer):
+class LearnedNorth(Frozen):
     """How far north is off where the tag is, as its track tells it, which began with a told heading."""
 
     error_rad: float = Field(description="What is to be added to the site's `declination_rad` for this tag.")
     std_rad: float = Field(description="Standard deviation of that.")
 
 
-class SpeedTrack(_Answer):
+class SpeedTrack(Frozen):
     """Speeds of the last minute, in columns. In a very large fleet the history is shorter."""
 
     t_ns: list[int]
     speed_mps: list[float | None]
 
 
-class HeightTrack(_Answer):
+class HeightTrack(Frozen):
     """Heights of the last minute, in columns, as `z` and `z_std_m` of poses."""
 
     t_ns: list[int]
@@ -98,7 +95,7 @@ class HeightTrack(_Answer):
     z_std_m: list[float | None]
 
 
-class Explanation(_Answer):
+class Explanation(Frozen):
     """The evidence behind the latest pose of a tag."""
 
     pose: Pose

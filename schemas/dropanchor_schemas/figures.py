@@ -1,22 +1,19 @@
 """Models of the figures of tags over a period: distance, speed and time in zones."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from dropanchor_schemas.models import Frozen
 from dropanchor_schemas.tracks import TagSummary
 
 
-class _Answer(BaseModel):
-    model_config = ConfigDict(frozen=True)
-
-
-class FigureZone(_Answer):
+class FigureZone(Frozen):
     """A zone that tags were in."""
 
     zone: str = Field(description="Id of the zone.")
     name: str | None = Field(description="Name for people; null: the zone was deleted.")
 
 
-class TimeInZone(_Answer):
+class TimeInZone(Frozen):
     """How long a tag was in a zone."""
 
     zone: str = Field(description="Id of the zone.")
@@ -33,7 +30,7 @@ class TagFigures(TagSummary):
     zones: list[TimeInZone] = Field(description="The zones that the tag was in, ordered by id.")
 
 
-class Figures(_Answer):
+class Figures(Frozen):
     """Distance, speed and time in zones of each tag over a period."""
 
     from_ns: int = Field(description="UTC, ns: start of the period.")

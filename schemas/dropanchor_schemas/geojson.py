@@ -2,17 +2,14 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from dropanchor_schemas.models import Frozen
 from dropanchor_schemas.pose import Pose, TimedPose
 from dropanchor_schemas.track import TrackPose
 
 
-class _Answer(BaseModel):
-    model_config = ConfigDict(frozen=True)
-
-
-class Point(_Answer):
+class Point(Frozen):
     """A place on the earth."""
 
     type: Literal["Point"]
@@ -21,7 +18,7 @@ class Point(_Answer):
     )
 
 
-class _Feature(_Answer):
+class _Feature(Frozen):
     type: Literal["Feature"]
     geometry: Point | None = Field(description="null while the position is unknown.")
 
@@ -46,7 +43,7 @@ class TrackFeature(_Feature):
     properties: TrackPose
 
 
-class _Collection(_Answer):
+class _Collection(Frozen):
     type: Literal["FeatureCollection"]
 
 

@@ -1,13 +1,11 @@
 """Models of a heat map: for how long tags were where."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from dropanchor_schemas.models import Frozen
 
 
-class _Answer(BaseModel):
-    model_config = ConfigDict(frozen=True)
-
-
-class HeatCells(_Answer):
+class HeatCells(Frozen):
     """Square cells that hold any time, as columns of equal length."""
 
     x: list[float] = Field(description="East, m: the centre of the cell in the frame of the site.")
@@ -15,7 +13,7 @@ class HeatCells(_Answer):
     seconds: list[float] = Field(description="How long tags were in the cell: the sum over all tags.")
 
 
-class HeatMap(_Answer):
+class HeatMap(Frozen):
     """For how long tags were where over a period."""
 
     from_ns: int = Field(description="UTC, ns: start of the period, inclusive.")

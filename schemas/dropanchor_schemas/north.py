@@ -1,15 +1,12 @@
 """Models of where north is at a site, as the tracks of its tags tell it."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from dropanchor_schemas.models import Frozen
 from dropanchor_schemas.pose import Phrase
 
 
-class _Answer(BaseModel):
-    model_config = ConfigDict(frozen=True)
-
-
-class TagNorth(_Answer):
+class TagNorth(Frozen):
     """What the track of one tag tells."""
 
     tag: str
@@ -17,7 +14,7 @@ class TagNorth(_Answer):
     std_rad: float = Field(description="Standard deviation of that.")
 
 
-class SiteNorth(_Answer):
+class SiteNorth(Frozen):
     """What the tags together tell, whose start and heading were told and whose magnetometer counts.
 
     Tags of one site differ by 0.14 rad (8°) beside what each is unsure of: by the iron around them and by how they are

@@ -2,8 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import BaseModel, Field, FiniteFloat, model_validator
 
+from dropanchor_schemas.models import Exact
 from dropanchor_schemas.pose import Phrase
 from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Id, Label, Number, NumberOnly, StrictBool
@@ -20,11 +21,7 @@ Height = Annotated[FiniteFloat, Field(ge=-MAX_HEIGHT_M, le=MAX_HEIGHT_M), Number
 Pixel = Annotated[FiniteFloat, Field(ge=-MAX_SIDE_PX, le=2 * MAX_SIDE_PX), NumberOnly]
 
 
-class _Edited(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class PlanImage(_Edited):
+class PlanImage(Exact):
     """An image that was uploaded. Its content never changes."""
 
     id: str = Field(pattern="^[0-9a-f]{32}$", description="Id of the image: a digest of its content.")
@@ -33,7 +30,7 @@ class PlanImage(_Edited):
     height_px: Side
 
 
-class Placement(_Edited):
+class Placement(Exact):
     """Where an image lies in the site frame: it is moved, turned and scaled, but not distorted."""
 
     x: Coordinate = Field(description="Centre of the image, m.")
@@ -46,7 +43,7 @@ class Placement(_Edited):
     )
 
 
-class ControlPoint(_Edited):
+class ControlPoint(Exact):
     """A place on the image, and where it lies in the site frame."""
 
     column_px: Pixel = Field(description="Distance from the left edge of the image.")
@@ -55,7 +52,7 @@ class ControlPoint(_Edited):
     y: Coordinate
 
 
-class Floor(_Edited):
+class Floor(Exact):
     """A floor. Plans with the same name of a floor belong together."""
 
     name: Annotated[Label, Field(min_length=1)]
@@ -69,7 +66,7 @@ class Floor(_Edited):
         return self
 
 
-class Plan(_Edited):
+class Plan(Exact):
     """A floor plan below the tags on the map."""
 
     id: Id = Field(description="Id of the plan, as in its path.")

@@ -1,24 +1,21 @@
 """Models of requests and answers about recordings."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from dropanchor_schemas.models import Exact, Frozen
 from dropanchor_schemas.site import Id
 
 
-class RecordingRequest(BaseModel):
+class RecordingRequest(Exact):
     """Which tags to record."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     tags: list[Id] | None = Field(
         default=None, max_length=10_000, description="The tags to record; null or empty: all."
     )
 
 
-class RecordingState(BaseModel):
+class RecordingState(Frozen):
     """Whether the service is recording, and what."""
-
-    model_config = ConfigDict(frozen=True)
 
     recording: bool
     since_ns: int | None = Field(default=None, description="UTC, ns: when the recording started.")
@@ -26,10 +23,8 @@ class RecordingState(BaseModel):
     file: str | None = Field(default=None, description="The current file; null until the first one is created.")
 
 
-class RecordedFile(BaseModel):
+class RecordedFile(Frozen):
     """A recording file."""
-
-    model_config = ConfigDict(frozen=True)
 
     name: str
     bytes: int

@@ -2,15 +2,15 @@
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from dropanchor_schemas.models import Frozen
 
 SettingSource = Literal["rest", "command_line", "environment", "file", "first_range", "default"]
 
 
-class HeldValue(BaseModel):
+class HeldValue(Frozen):
     """A value that one source has."""
-
-    model_config = ConfigDict(frozen=True)
 
     source: SettingSource = Field(
         description="rest: set over REST or on the page; file: the settings file; first_range: the anchor of the first "
@@ -37,10 +37,8 @@ class SettingValue(HeldValue):
     )
 
 
-class SettingValueList(BaseModel):
+class SettingValueList(Frozen):
     """total: how many there are, beyond the limit, too."""
-
-    model_config = ConfigDict(frozen=True)
 
     values: list[SettingValue]
     total: int = Field(description="How many values there are, also beyond `limit`.")

@@ -2,18 +2,17 @@
 
 from typing import Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from dropanchor_schemas.models import Exact, Frozen
 from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Id, Label
 
 DAY_S = 86_400
 
 
-class ShareRequest(BaseModel):
+class ShareRequest(Exact):
     """What to share, and for how long."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: Label = Field(default="", description="What the link is for, as the list of links shows it.")
     valid_s: int = Field(default=7 * DAY_S, ge=60, le=366 * DAY_S, description="For how many seconds the link works.")
@@ -35,10 +34,8 @@ class ShareRequest(BaseModel):
         return self
 
 
-class Share(BaseModel):
+class Share(Frozen):
     """A link that was created, without its secret."""
-
-    model_config = ConfigDict(frozen=True)
 
     id: str
     name: str
@@ -59,10 +56,8 @@ class NewShare(Share):
     )
 
 
-class ShareList(BaseModel):
+class ShareList(Frozen):
     """The links that are neither revoked nor long expired."""
-
-    model_config = ConfigDict(frozen=True)
 
     available: bool = Field(
         description="Whether links can be created and revoked. They need access control, without which everybody sees "

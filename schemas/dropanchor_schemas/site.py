@@ -2,11 +2,12 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, FiniteFloat, model_validator
 from pydantic.config import JsonDict
 
 from dropanchor_schemas.file_names import file_name_of
 from dropanchor_schemas.keys import checked_id
+from dropanchor_schemas.models import Exact
 from dropanchor_schemas.remote import MAX_BATCH_S, MAX_IMU_HZ, MIN_BATCH_S, MIN_IMU_HZ
 from dropanchor_schemas.sentences import say
 from dropanchor_schemas.wire import anchor_number
@@ -65,11 +66,7 @@ Positive = Annotated[FiniteFloat, Field(gt=0), NumberOnly]
 NotNegative = Annotated[FiniteFloat, Field(ge=0), NumberOnly]
 
 
-class _Settings(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Anchor(_Settings):
+class Anchor(Exact):
     """A dropped UWB anchor and its position in the site frame."""
 
     id: Id = Field(description="Id as the tags send it: a decimal number, or text.")
@@ -93,7 +90,7 @@ class Anchor(_Settings):
         return anchor_number(self.id)
 
 
-class Georeference(_Settings):
+class Georeference(Exact):
     """Where the origin of the site frame lies on the Earth (WGS 84)."""
 
     lat: Annotated[FiniteFloat, Field(ge=-90, le=90, description="Latitude of the origin, degrees."), NumberOnly]
@@ -106,7 +103,7 @@ class Georeference(_Settings):
     )
 
 
-class StartPose(_Settings):
+class StartPose(Exact):
     """Where a tag is when it first sends data."""
 
     x: Number = Field(description="Position along the site's x axis.")
@@ -117,7 +114,7 @@ class StartPose(_Settings):
     std_m: Positive = Field(default=0.1, description="Standard deviation of x and of y.")
 
 
-class TagSettings(_Settings):
+class TagSettings(Exact):
     """What an operator knows about a tag. A measured range is range_scale · distance + range_bias_m."""
 
     name: Label = Field(default="", description="Display name; empty: the id of the tag.")
@@ -219,7 +216,7 @@ class TagSettings(_Settings):
         return defaults.model_copy(update={name: getattr(self, name) for name in self.model_fields_set})
 
 
-class RemoteSettings(_Settings):
+class RemoteSettings(Exact):
     """What the service sets in the program of a tag, while it runs."""
 
     batch_s: Annotated[FiniteFloat, Field(ge=MIN_BATCH_S, le=MAX_BATCH_S), NumberOnly] | None = Field(
@@ -230,7 +227,7 @@ class RemoteSettings(_Settings):
     )
 
 
-class Site(_Settings):
+class Site(Exact):
     """One site: its frame and its anchors. Without anchors, the anchor of the first range becomes the origin."""
 
     id: SiteId = Field(default="default", description="Id of the site in Zenoh keys.")

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from dropanchor_schemas.health import LIMITS, MAX_FIRMWARE_LENGTH, MAX_HEALTH_BYTES, is_absurd
+from dropanchor_schemas.models import Frozen
 from dropanchor_schemas.pose import Phrase
 from dropanchor_schemas.samples import rejection_of, unknown_version
 from dropanchor_schemas.site import RemoteSettings
@@ -75,10 +76,8 @@ CareReason = Literal[
 ]
 
 
-class Care(BaseModel):
+class Care(Frozen):
     """One thing that a person should do for a tag."""
-
-    model_config = ConfigDict(frozen=True)
 
     reason: CareReason
     hint: str

@@ -1,15 +1,12 @@
 """Models of the track of a tag, which the service returns page by page."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from dropanchor_schemas.models import Frozen
 from dropanchor_schemas.pose import Frame, HeightSource, RelativePose, TrackingState
 
 
-class _Answer(BaseModel):
-    model_config = ConfigDict(frozen=True)
-
-
-class TrackPose(_Answer):
+class TrackPose(Frozen):
     """A pose as it was stored when it was computed. Numbers have float32 precision."""
 
     t_ns: int = Field(description="UTC, ns: the time of the pose.")
@@ -44,7 +41,7 @@ class TrackPose(_Answer):
     )
 
 
-class Track(_Answer):
+class Track(Frozen):
     """One page of the track of a tag."""
 
     tag: str

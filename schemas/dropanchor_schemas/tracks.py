@@ -2,13 +2,10 @@
 
 from enum import StrEnum
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from dropanchor_schemas.models import Frozen
 from dropanchor_schemas.pose import Frame, HeightSource, RelativePose, TrackingState
-
-
-class _Answer(BaseModel):
-    model_config = ConfigDict(frozen=True)
 
 
 class Between(StrEnum):
@@ -19,7 +16,7 @@ class Between(StrEnum):
     UNKNOWN = "unknown"
 
 
-class TrackPoints(_Answer):
+class TrackPoints(Frozen):
     """Points of a track in order of time, as columns of equal length. Each point is a stored pose."""
 
     t_ns: list[int] = Field(description="UTC, ns.")
@@ -51,7 +48,7 @@ class TrackPoints(_Answer):
     )
 
 
-class TagSummary(_Answer):
+class TagSummary(Frozen):
     """How far and how fast a tag went over the period."""
 
     tag: str
@@ -70,7 +67,7 @@ class TagTrack(TagSummary):
     points: TrackPoints
 
 
-class Tracks(_Answer):
+class Tracks(Frozen):
     """The tracks of many tags over a period."""
 
     from_ns: int = Field(description="UTC, ns: start of the period, inclusive.")
@@ -78,7 +75,7 @@ class Tracks(_Answer):
     tracks: list[TagTrack] = Field(description="One for each tag with a stored pose in the period, ordered by name.")
 
 
-class History(_Answer):
+class History(Frozen):
     """Whether poses are stored, and which time they cover."""
 
     enabled: bool = Field(description="Whether the service stores a history.")
@@ -86,14 +83,14 @@ class History(_Answer):
     to_ns: int | None = Field(description="UTC, ns: the newest pose is up to 10 s older.")
 
 
-class Stretch(_Answer):
+class Stretch(Frozen):
     """A time in which poses are stored."""
 
     from_ns: int = Field(description="UTC, ns, inclusive.")
     to_ns: int = Field(description="UTC, ns, exclusive.")
 
 
-class Coverage(_Answer):
+class Coverage(Frozen):
     """When poses of any tag are stored."""
 
     from_ns: int | None = Field(

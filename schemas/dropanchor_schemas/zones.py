@@ -2,8 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import BaseModel, Field, FiniteFloat, model_validator
 
+from dropanchor_schemas.models import Exact
 from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Id, Label, NumberOnly, StrictBool
 
@@ -15,11 +16,7 @@ Coordinate = Annotated[FiniteFloat, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINAT
 Ids = Annotated[list[Id], Field(max_length=MAX_TAGS)]
 
 
-class _Edited(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Polygon(_Edited):
+class Polygon(Exact):
     """A polygon in the site frame. Its last point connects to its first."""
 
     type: Literal["polygon"]
@@ -30,7 +27,7 @@ class Polygon(_Edited):
     )
 
 
-class Circle(_Edited):
+class Circle(Exact):
     """A circle in the site frame."""
 
     type: Literal["circle"]
@@ -39,7 +36,7 @@ class Circle(_Edited):
     radius_m: Annotated[FiniteFloat, Field(ge=0.1, le=10_000), NumberOnly]
 
 
-class Concerned(_Edited):
+class Concerned(Exact):
     """The tags that a zone or a rule concerns. If both lists are empty, it concerns all tags."""
 
     tags: Ids = Field(default=[], description="Ids of tags.")

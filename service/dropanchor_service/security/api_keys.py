@@ -15,9 +15,10 @@ from contextlib import contextmanager, suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id, refuse_pattern
+from dropanchor_schemas.models import Exact
 from dropanchor_schemas.sentences import say
 from dropanchor_service.runtime.atomic_file import sync_folder, write_atomically
 from dropanchor_service.runtime.written_by import later_in, mark
@@ -38,13 +39,11 @@ class ApiKeyError(ValueError):
     """A key cannot be created or revoked; the message says why."""
 
 
-class ApiKey(BaseModel):
+class ApiKey(Exact):
     """The stored record of a key, without its secret. It has either a scope or a tag, whose samples it may send.
 
     site: the only site that the key is for; None: every site that the service has.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str
     scope: Scope | None

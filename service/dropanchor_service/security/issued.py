@@ -4,16 +4,13 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict
-
 from dropanchor_schemas.keys import NOT_IDS
+from dropanchor_schemas.models import Exact
 from dropanchor_service.security.access_control import Holder
 
 
-class IssuedTag(BaseModel):
+class IssuedTag(Exact):
     """The record of a certificate that was issued to a tag. site: None for a tag of the folder's first site."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     serial: str
     expires: datetime
@@ -21,13 +18,11 @@ class IssuedTag(BaseModel):
     site: str | None = None
 
 
-class Table(BaseModel):
+class Table(Exact):
     """The issued certificates and the addresses of the router.
 
     site: the first site. more_sites: those that share its router. tags: by the common names of their certificates.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     site: str
     hosts: tuple[str, ...]

@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from dropanchor_schemas.models import Exact
 
 
-class BasemapSettings(BaseModel):
+class BasemapSettings(Exact):
     """A map behind a site with latitude and longitude. It needs no internet access."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     tiles: Path | None = Field(
         default=None,

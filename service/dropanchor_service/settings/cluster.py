@@ -4,8 +4,9 @@ import re
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from dropanchor_schemas.models import Exact
 from dropanchor_service.settings.ids import SettingsId
 
 
@@ -17,10 +18,8 @@ def _is_postgresql(url: str) -> str:
     return url
 
 
-class ClusterSettings(BaseModel):
+class ClusterSettings(Exact):
     """Several processes with the same sites: one serves them, the others take over when it dies."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     url: Annotated[str, AfterValidator(_is_postgresql)] | None = Field(
         default=None,

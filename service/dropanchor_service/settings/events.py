@@ -3,17 +3,14 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, IPvAnyNetwork, model_validator
+from pydantic import BeforeValidator, Field, IPvAnyNetwork, model_validator
 
 from dropanchor_schemas.destinations import Address
+from dropanchor_schemas.models import Exact
 from dropanchor_service.settings.lists import as_list
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class EventSettings(_Section):
+class EventSettings(Exact):
     """How events are found, and which are kept. Zones and rules are set over REST."""
 
     period_ms: Annotated[float, Field(ge=50, le=10_000)] = Field(
@@ -25,7 +22,7 @@ class EventSettings(_Section):
     )
 
 
-class DeliverySettings(_Section):
+class DeliverySettings(Exact):
     """How events are delivered to destinations. The destinations are set over REST."""
 
     allow_networks: Annotated[tuple[IPvAnyNetwork, ...], BeforeValidator(as_list)] = Field(
@@ -52,7 +49,7 @@ class DeliverySettings(_Section):
     )
 
 
-class _ServerSettings(_Section):
+class _ServerSettings(Exact):
     server: str | None = Field(default=None, description="Name or address; not set: there is none.")
     port: Annotated[int, Field(ge=1, le=65_535)] | None = Field(default=None, description="Not set: the usual port.")
     user: str | None = Field(default=None, description="Name to log in with; not set: no login.")

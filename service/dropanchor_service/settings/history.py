@@ -4,13 +4,10 @@ from pathlib import Path
 from typing import Annotated
 from urllib.parse import parse_qs, urlsplit
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from dropanchor_schemas.models import Exact
 from dropanchor_service.settings.ids import SettingsId
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def _is_database_url(url: str) -> str:
@@ -23,7 +20,7 @@ def _is_database_url(url: str) -> str:
     return url
 
 
-class HistorySettings(_Section):
+class HistorySettings(Exact):
     """Where the history is, which poses it keeps, and for how long."""
 
     enabled: bool = Field(default=True, description="Whether to keep a history. It needs a `data_dir` or a `url`.")
@@ -62,7 +59,7 @@ class HistorySettings(_Section):
         return self
 
 
-class RecordingSettings(_Section):
+class RecordingSettings(Exact):
     """What to record in `data_dir`/recordings, and for how long to keep it."""
 
     enabled: bool = Field(default=False, description="Record from the start; otherwise when REST asks for it.")

@@ -5,8 +5,9 @@ from ipaddress import ip_network
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, IPvAnyNetwork, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, IPvAnyNetwork, model_validator
 
+from dropanchor_schemas.models import Exact
 from dropanchor_service.settings.lists import as_list
 
 Port = Annotated[int, Field(ge=0, le=65535)]
@@ -29,10 +30,8 @@ Networks = Annotated[tuple[IPvAnyNetwork, ...], BeforeValidator(as_list)]
 Origins = Annotated[tuple[Annotated[str, AfterValidator(_is_origin)], ...], BeforeValidator(as_list)]
 
 
-class HttpSettings(BaseModel):
+class HttpSettings(Exact):
     """Where the page and the REST interface are served."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     host: str = Field(default="127.0.0.1", min_length=1, description="Address to listen on.")
     port: Port = Field(default=8080, description="Port to listen on; 0 takes any free one.")

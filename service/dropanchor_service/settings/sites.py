@@ -2,8 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from dropanchor_schemas.models import Exact
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.settings.ids import SettingsId
 from dropanchor_service.settings.quota import Quota, UnknownTags
@@ -11,10 +12,8 @@ from dropanchor_service.settings.quota import Quota, UnknownTags
 ScopeName = Literal["read", "write", "admin"]
 
 
-class SiteSettings(BaseModel):
+class SiteSettings(Exact):
     """One of several sites. What is not set is as at the top level."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     unknown_tags: UnknownTags | None = Field(default=None, description="`unknown_tags` of this site.")
     max_unconfirmed_tags: Annotated[int, Field(ge=0, le=1_000_000)] | None = Field(

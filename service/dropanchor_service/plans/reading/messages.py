@@ -2,21 +2,20 @@
 
 from dataclasses import dataclass
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
 
+from dropanchor_schemas.models import Frozen
 from dropanchor_schemas.plans import ImageType, Placement
 from dropanchor_schemas.pose import Phrase
 from dropanchor_schemas.site import Georeference
 
 
-class Request(BaseModel):
+class Request(Frozen):
     """What is known of a file.
 
     media_type: of its content. page: of a PDF, from 1. world: the six numbers of a world file. crs: coordinates of
     the world file or GeoTIFF; empty: not known.
     """
-
-    model_config = ConfigDict(frozen=True)
 
     media_type: str
     page: int = 1
