@@ -7,6 +7,7 @@ from fastapi import APIRouter, Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute
 
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.http.site_in_path import OMLOX_PREFIX
 from dropanchor_service.api.omlox.document import document_of
 from dropanchor_service.api.omlox.feed import socket
@@ -34,14 +35,14 @@ def omlox_routes(has_one_site: bool) -> tuple[BaseRoute, ...]:
 
 def described_routes() -> APIRouter:
     """Return the routes that the document describes."""
-    router = APIRouter()
+    router = Router()
     for part in (trackables, providers, zones, fences):
         router.routes.extend(part.router.routes)
     return router
 
 
 def _document_router(described: APIRouter) -> APIRouter:
-    router = APIRouter()
+    router = Router()
 
     @cache
     def document() -> dict[str, Any]:

@@ -9,12 +9,13 @@ from contextlib import contextmanager
 from datetime import datetime
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Path, Request
+from fastapi import Body, Path, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.api_keys import AccessKey, AccessKeyList, KeyRequest, NewAccessKey
 from dropanchor_schemas.sentences import said_by, say
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
 from dropanchor_service.api.routes.shared_parts import shared_of
 from dropanchor_service.api.routes.site_of_request import parts_of, sites_of, trail_of
@@ -36,12 +37,11 @@ The key works in this site alone, until it expires or is revoked. Its `secret` i
 hash. A key with a tag sends the samples of that tag and does nothing else; the page `/tag/` makes a phone that tag."""
 
 
-router = APIRouter(tags=["keys"], dependencies=[NO_QUERY])
+router = Router(tags=["keys"], dependencies=[NO_QUERY])
 
 
 @router.get(
     "/keys",
-    operation_id="list_keys",
     summary="List the API keys of the site, but for those of administrators",
     response_model=AccessKeyList,
     responses=example_response({"available": True, "keys": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
@@ -55,7 +55,6 @@ def list_keys(request: Request) -> Response:
 
 @router.post(
     "/keys",
-    operation_id="create_key",
     summary="Create an API key for reading, writing, or a tag",
     description=_DESCRIPTION,
     status_code=201,
@@ -83,7 +82,6 @@ def create_key(
 
 @router.delete(
     "/keys/{key}",
-    operation_id="revoke_key",
     summary="Revoke an API key, which ends its streams",
     status_code=204,
     responses=problems(Kind.UNKNOWN_KEY, Kind.INVALID_REQUEST, Kind.NOT_SAVED),

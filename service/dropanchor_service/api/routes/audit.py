@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import chain
 from typing import Annotated, Any, Literal, get_args
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from starlette.responses import Response, StreamingResponse
 
@@ -13,6 +13,7 @@ from dropanchor_schemas.audit import SECRET_KINDS, AuditKind, AuditList
 from dropanchor_schemas.site import Id
 from dropanchor_service.api.formats.audit import csv_lines, json_lines
 from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.contents import TEXT
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.parameters import TimeNs, example_response, json_response, words_of
@@ -81,12 +82,11 @@ class AuditFileQuery(AuditFilter):
     format: Literal["csv", "jsonl"] = Field(default="jsonl", description="JSON lines, or CSV with JSON in two columns.")
 
 
-router = APIRouter(tags=["site"])
+router = Router(tags=["site"])
 
 
 @router.get(
     "/audit",
-    operation_id="list_changes",
     summary="List who changed which setting, when, and what it was before",
     description=_DESCRIPTION,
     response_model=AuditList,
@@ -102,7 +102,6 @@ def list_changes(query: Annotated[AuditQuery, Query()], request: Request) -> Res
 
 @router.get(
     "/audit/file",
-    operation_id="get_changes_file",
     summary="Download who changed which setting, as CSV or JSON lines",
     response_class=StreamingResponse,
     responses=problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE)

@@ -2,11 +2,12 @@
 
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-from fastapi import APIRouter, Header, Path, Request
+from fastapi import Header, Path, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.basemap import Basemap, TileMediaType
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.api.routes.shared_parts import shared_of
@@ -43,12 +44,11 @@ Column = Annotated[int, Path(ge=0, lt=2**31, description="Column of the tile, fr
 Line = Annotated[int, Path(ge=0, lt=2**31, description="Line of the tile, from the north.", examples=[10749])]
 
 
-router = APIRouter(tags=["basemap"], dependencies=[NO_QUERY])
+router = Router(tags=["basemap"], dependencies=[NO_QUERY])
 
 
 @router.get(
     "/basemap",
-    operation_id="get_basemap",
     summary="Get what the base map is, and who made it",
     response_model=Basemap,
     responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST),
@@ -60,7 +60,6 @@ async def get_basemap(request: Request) -> Response:
 
 @router.get(
     "/basemap/{z}/{x}/{y}",
-    operation_id="get_basemap_tile",
     summary="Get a tile of the base map",
     description="A tile in web Mercator, as OpenStreetMap numbers them. It is never compressed.",
     response_class=Response,

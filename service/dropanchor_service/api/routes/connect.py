@@ -2,12 +2,13 @@
 
 import ipaddress
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from starlette.responses import Response
 
 from dropanchor_schemas.answers import Connect
 from dropanchor_service.answers.connect_command import reachable_endpoint, simulate_command, tag_command
 from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.api.routes.shared_parts import shared_of
@@ -17,12 +18,11 @@ SIMULATED_TAG = "sim-1"
 _FORWARDED = ("forwarded", "x-forwarded-for", "x-real-ip", "via")
 
 
-router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
+router = Router(tags=["site"], dependencies=[NO_QUERY])
 
 
 @router.get(
     "/connect",
-    operation_id="get_connect",
     summary="Get the endpoints for tags, and a command that starts a simulated tag",
     response_model=Connect,
     responses=example_response(examples.CONNECT) | problems(Kind.INVALID_REQUEST),

@@ -2,12 +2,13 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
 from dropanchor_schemas.tracks import Coverage
 from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.parameters import TimeNs, example_response, json_response
 from dropanchor_service.api.routes.period import history_of, require_order, unreadable
 from dropanchor_service.api.routes.site_of_request import answers_of
@@ -46,12 +47,11 @@ class CoverageQuery(BaseModel):
     )
 
 
-router = APIRouter(tags=["poses"])
+router = Router(tags=["poses"])
 
 
 @router.get(
     "/history/coverage",
-    operation_id="get_history_coverage",
     summary="Get when poses are stored",
     description="When poses of any tag are stored. The period may have any length.",
     response_model=Coverage,

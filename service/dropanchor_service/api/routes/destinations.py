@@ -3,7 +3,7 @@
 from typing import Annotated
 
 import orjson
-from fastapi import APIRouter, Body, Request
+from fastapi import Body, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.destinations import (
@@ -19,6 +19,7 @@ from dropanchor_schemas.destinations import (
 from dropanchor_schemas.sentences import phrase_of, said_by, with_stop
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.http.etags import Conditions
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.items import CHANGE_KINDS, DestinationId, delete, found, item_response, put
@@ -35,12 +36,11 @@ _READ = (Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE)
 _ONE = (Kind.UNKNOWN_DESTINATION, *_READ)
 
 
-router = APIRouter(tags=["destinations"], dependencies=[NO_QUERY])
+router = Router(tags=["destinations"], dependencies=[NO_QUERY])
 
 
 @router.get(
     "/destinations",
-    operation_id="list_destinations",
     summary="List the destinations and the state of their queues",
     response_model=DestinationList,
     responses=example_response({"destinations": [examples.DESTINATION_STATE], "unavailable": {}}) | problems(*_READ),
@@ -58,7 +58,6 @@ def list_destinations(request: Request) -> Response:
 
 @router.get(
     "/destinations/{destination}",
-    operation_id="get_destination",
     summary="Get a destination and the state of its queue",
     response_model=DestinationState,
     responses=example_response(examples.DESTINATION_STATE) | problems(*_ONE),
@@ -70,7 +69,6 @@ def get_destination(destination: DestinationId, request: Request) -> Response:
 
 @router.put(
     "/destinations/{destination}",
-    operation_id="put_destination",
     summary="Create or replace a destination",
     description="It gets the events from now on. A webhook inside needs its network among those of receivers: a "
     "refusal for that names it as `network`. An e-mail needs a mail server, and MQTT a broker. The poses of "
@@ -95,7 +93,6 @@ def put_destination(
 
 @router.delete(
     "/destinations/{destination}",
-    operation_id="delete_destination",
     summary="Delete a destination and its queue",
     status_code=204,
     responses=problems(Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, *_ONE),
@@ -110,7 +107,6 @@ def delete_destination(destination: DestinationId, allows: Conditions, request: 
 
 @router.post(
     "/destinations/{destination}/test",
-    operation_id="test_destination",
     summary="Send a test event to a destination now",
     response_model=DestinationTest,
     responses=example_response(examples.DESTINATION_TEST) | problems(Kind.DESTINATION_REFUSED, *_ONE),
@@ -130,7 +126,6 @@ async def test_destination(destination: DestinationId, request: Request) -> Resp
 
 @router.get(
     "/destinations/{destination}/dead-letters",
-    operation_id="list_dead_letters",
     summary="List the events whose delivery was given up",
     response_model=DeadLetterList,
     responses=example_response(examples.DEAD_LETTERS) | problems(*_ONE),
@@ -146,7 +141,6 @@ def list_dead_letters(destination: DestinationId, request: Request) -> Response:
 
 @router.post(
     "/destinations/{destination}/dead-letters/retry",
-    operation_id="retry_dead_letters",
     summary="Put the dead letters of a destination back into its queue",
     description="A dead letter goes back by itself once, an hour after it became one.",
     response_model=Retried,
@@ -161,7 +155,6 @@ def retry_dead_letters(destination: DestinationId, request: Request) -> Response
 
 @router.delete(
     "/destinations/{destination}/dead-letters",
-    operation_id="delete_dead_letters",
     summary="Drop the dead letters of a destination",
     description="The events themselves stay.",
     status_code=204,

@@ -10,12 +10,13 @@ from threading import Event as ThreadEvent
 from typing import Annotated, Any
 
 import orjson
-from fastapi import APIRouter, Depends, Header, Query, Request
+from fastapi import Depends, Header, Query, Request
 from pydantic import AfterValidator, BeforeValidator, Field
 from starlette.responses import Response, StreamingResponse
 
 from dropanchor_schemas.events import EventList, EventType
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.parameters import (
     COMMA,
@@ -89,12 +90,11 @@ def _message(event: StoredEvent) -> bytes:
     return f"id: {event.sequence:020}\nevent: {kind}\ndata: ".encode() + event.body + b"\n\n"
 
 
-router = APIRouter(tags=["events"], dependencies=[Depends(_refuse_repeated)])
+router = Router(tags=["events"], dependencies=[Depends(_refuse_repeated)])
 
 
 @router.get(
     "/events",
-    operation_id="list_events",
     summary="List stored events",
     description="With `since` or `after`, the page begins there and `next` leads on. Without them, it holds the "
     "newest events. Events are always in order.",
@@ -116,7 +116,6 @@ def list_events(query: Annotated[EventQuery, Query()], request: Request) -> Resp
 
 @router.get(
     "/events/stream",
-    operation_id="stream_events",
     summary="Stream events as they happen",
     description=_STREAM,
     response_class=StreamingResponse,

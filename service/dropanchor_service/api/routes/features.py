@@ -5,7 +5,7 @@ from enum import StrEnum
 from typing import Annotated, Any
 from urllib.parse import quote, urlencode
 
-from fastapi import APIRouter, Path, Query, Request
+from fastapi import Path, Query, Request
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
@@ -24,6 +24,7 @@ from dropanchor_service.answers.times import iso_utc
 from dropanchor_service.api.formats import geojson
 from dropanchor_service.api.http.behind_proxy import prefix_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.contents import schema_of
 from dropanchor_service.api.routes.feature_collections import COLLECTIONS, Span, box_of, features_of
 from dropanchor_service.api.routes.parameters import NO_QUERY, id_of, json_response
@@ -80,7 +81,7 @@ class ItemsQuery(BaseModel):
     offset: int = Field(default=0, ge=0, lt=2**31, description="How many features to leave out: see the link `next`.")
 
 
-router = APIRouter(tags=["features"])
+router = Router(tags=["features"])
 
 
 def _link(request: Request, path: str, rel: str, media_type: str = geojson.JSON) -> dict[str, str]:
@@ -93,14 +94,13 @@ def _link(request: Request, path: str, rel: str, media_type: str = geojson.JSON)
 
 @router.get(
     _ROOT,
-    operation_id="get_features_landing_page",
     summary="Find what OGC API – Features has here",
     description="Give this address to QGIS, GDAL (`OAPIF:`) or any other client of OGC API – Features.",
     response_model=FeaturesLandingPage,
     responses=problems(Kind.INVALID_REQUEST),
     dependencies=[NO_QUERY],
 )
-def get_landing_page(request: Request) -> Response:
+def get_features_landing_page(request: Request) -> Response:
     links = [
         _link(request, _ROOT, "self"),
         _link(request, "/openapi.json", "service-desc", "application/vnd.oai.openapi+json;version=3.1"),
@@ -112,38 +112,35 @@ def get_landing_page(request: Request) -> Response:
 
 @router.get(
     f"{_ROOT}/conformance",
-    operation_id="get_features_conformance",
     summary="List what of OGC API – Features holds here",
     response_model=FeaturesConformance,
     responses=problems(Kind.INVALID_REQUEST),
     dependencies=[NO_QUERY],
 )
-def get_conformance() -> Response:
+def get_features_conformance() -> Response:
     return json_response({"conformsTo": CONFORMS_TO})
 
 
 @router.get(
     f"{_ROOT}/collections",
-    operation_id="list_feature_collections",
     summary="List the collections of features",
     response_model=FeatureCollectionList,
     responses=problems(Kind.INVALID_REQUEST),
     dependencies=[NO_QUERY],
 )
-def list_collections(request: Request) -> Response:
+def list_feature_collections(request: Request) -> Response:
     links = [_link(request, f"{_ROOT}/collections", "self")]
     return json_response({"links": links, "collections": [_described(request, name) for name in COLLECTIONS]})
 
 
 @router.get(
     f"{_ROOT}/collections/{{collection}}",
-    operation_id="get_feature_collection",
     summary="Get a collection of features",
     response_model=FeatureCollectionInfo,
     responses=problems(Kind.INVALID_REQUEST),
     dependencies=[NO_QUERY],
 )
-def get_collection(collection: InCollection, request: Request) -> Response:
+def get_feature_collection(collection: InCollection, request: Request) -> Response:
     return json_response(_described(request, collection))
 
 
@@ -153,7 +150,6 @@ def _offers(model: type[BaseModel]) -> dict[int | str, dict[str, Any]]:
 
 @router.get(
     f"{_ROOT}/collections/{{collection}}/items",
-    operation_id="list_features",
     summary="List the features of a collection",
     response_class=Response,
     responses=_offers(FeaturePage) | problems(*_READS),
@@ -173,7 +169,6 @@ def list_features(collection: InCollection, query: Annotated[ItemsQuery, Query()
 
 @router.get(
     f"{_ROOT}/collections/{{collection}}/items/{{item}}",
-    operation_id="get_feature",
     summary="Get a feature of a collection",
     response_class=Response,
     responses=_offers(FeatureItemAlone) | problems(Kind.NOT_FOUND, *_READS),

@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from pydantic import AfterValidator, Field
 from starlette.responses import Response
 
@@ -13,6 +13,7 @@ from dropanchor_service.answers.answers import Answers
 from dropanchor_service.answers.many_tracks import NO_FIGURES, figures_of
 from dropanchor_service.api.formats.figures import figures_csv
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.contents import TEXT
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.parameters import COMMA, Ids, example_response, ids_of, json_response
@@ -66,12 +67,11 @@ def _offers() -> dict[int | str, dict[str, Any]]:
     return offers
 
 
-router = APIRouter(tags=["poses"])
+router = Router(tags=["poses"])
 
 
 @router.get(
     "/figures",
-    operation_id="get_figures",
     summary="Get distance, speed and time in zones of tags",
     description=_DESCRIPTION,
     response_model=Figures,

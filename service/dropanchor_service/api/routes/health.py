@@ -10,6 +10,7 @@ from starlette.responses import Response
 from dropanchor_schemas.answers import Health
 from dropanchor_schemas.sentences import phrase_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.contents import TEXT
 from dropanchor_service.api.routes.parameters import NO_QUERY, json_response
 
@@ -18,11 +19,10 @@ Impaired = Callable[[], Sequence[str]]
 
 
 def health_router(ready: Ready, impaired: Impaired) -> APIRouter:
-    router = APIRouter(tags=["health"], dependencies=[NO_QUERY])
+    router = Router(tags=["health"], dependencies=[NO_QUERY])
 
     @router.get(
         "/health/live",
-        operation_id="get_live",
         summary="Check whether the service responds",
         response_model=Health,
         responses=problems(Kind.INVALID_REQUEST),
@@ -32,7 +32,6 @@ def health_router(ready: Ready, impaired: Impaired) -> APIRouter:
 
     @router.get(
         "/health/ready",
-        operation_id="get_ready",
         summary="Check whether the service can do its work",
         response_model=Health,
         responses=problems(Kind.INVALID_REQUEST, Kind.NOT_READY),
@@ -49,11 +48,10 @@ def health_router(ready: Ready, impaired: Impaired) -> APIRouter:
 
 
 def metrics_router(registry: CollectorRegistry) -> APIRouter:
-    router = APIRouter(tags=["health"])
+    router = Router(tags=["health"])
 
     @router.get(
         "/metrics",
-        operation_id="get_metrics",
         summary="Get metrics for Prometheus",
         response_class=Response,
         responses={200: {"content": {"text/plain": TEXT}}},

@@ -3,12 +3,13 @@
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from pydantic import Field
 from starlette.responses import Response
 
 from dropanchor_schemas.heat_map import HeatMap
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.parameters import example_response, json_response
 from dropanchor_service.api.routes.period import TagsInPeriod, history_of, limits_of, selected_tags, unreadable
 from dropanchor_service.api.routes.site_of_request import answers_of
@@ -44,12 +45,11 @@ class HeatMapQuery(TagsInPeriod):
     )
 
 
-router = APIRouter(tags=["poses"])
+router = Router(tags=["poses"])
 
 
 @router.get(
     "/heat-map",
-    operation_id="get_heat_map",
     summary="Get for how long tags were where",
     description=_DESCRIPTION,
     response_model=HeatMap,

@@ -1,10 +1,11 @@
 """The route that says whether there is a history, and which time it covers."""
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from starlette.responses import Response
 
 from dropanchor_schemas.tracks import History
 from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.api.routes.period import unreadable
 from dropanchor_service.api.routes.site_of_request import answers_of
@@ -13,12 +14,11 @@ from dropanchor_service.history.errors import HistoryError
 _EXAMPLE = {"enabled": True, "from_ns": 1_797_408_000_000_000_000, "to_ns": 1_800_000_000_000_000_000}
 
 
-router = APIRouter(tags=["poses"], dependencies=[NO_QUERY])
+router = Router(tags=["poses"], dependencies=[NO_QUERY])
 
 
 @router.get(
     "/history",
-    operation_id="get_history",
     summary="Get whether poses are stored, and which time they cover",
     response_model=History,
     responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),

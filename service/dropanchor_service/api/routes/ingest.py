@@ -4,20 +4,22 @@ import asyncio
 from dataclasses import asdict
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request
-from pydantic import BaseModel, ConfigDict, Field
+from fastapi import Query, Request
+from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import PlainTextResponse, Response
 
 from dropanchor_schemas.answers import PhoneReadingsReceived, SamplesReceived
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_schemas.kinds import KINDS, Frame
+from dropanchor_schemas.models import Exact
 from dropanchor_schemas.rejections import REASONS_EXPLAINED
 from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.site import ID_SCHEMA
 from dropanchor_schemas.times import why_not_utc
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Reason, Rejection, read_header
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.contents import BYTES, TEXT
 from dropanchor_service.api.routes.parameters import example_response, json_response
@@ -48,10 +50,8 @@ _SAMPLES_BODY = {
 }
 
 
-class OfTag(BaseModel):
+class OfTag(Exact):
     """The query of a route that takes samples."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     tag: str | None = Field(
         default=None,
@@ -81,7 +81,7 @@ def _phones(site: SiteParts) -> PhoneIntake[Message]:
     return PhoneIntake(site.receive, site.receive_health, parse, Session)
 
 
-router = APIRouter(tags=["ingest"])
+router = Router(tags=["ingest"])
 _phones_of = ForEachSite(_phones)
 _PHONE_ERROR = {"description": "A sentence that the app shows.", "content": {"text/plain": TEXT}}
 
@@ -93,7 +93,6 @@ def encoding_of(request: Request) -> str:
 
 @router.post(
     "/ingest/samples",
-    operation_id="ingest_samples",
     summary="Send samples of a tag",
     description="One payload of the contract, chosen by Content-Type as over Zenoh by the encoding, of at most "
     "65,536 bytes; the body may be packed (Content-Encoding: gzip or deflate). It is treated as if it had come "
@@ -117,7 +116,6 @@ async def ingest_samples(request: Request, query: Annotated[OfTag, Query()]) -> 
 
 @router.post(
     "/ingest/sensor-logger",
-    operation_id="ingest_sensor_logger",
     summary="Send readings of a phone with the app Sensor Logger",
     description="The address for the app's HTTP Push. Readings become IMU samples of the tag: at the times of the "
     "gyroscope, x to the top edge of the phone. Messages are put in order and used once each.",

@@ -2,13 +2,14 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.answers import HealthReceived
 from dropanchor_schemas.tag_health import decode_health
 from dropanchor_schemas.wire import ENCODING_JSON, Rejection
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.ingest import OfTag, encoding_of, tag_of
 from dropanchor_service.api.routes.parameters import example_response, json_response
@@ -17,12 +18,11 @@ from dropanchor_service.api.routes.site_of_request import parts_of
 _BODY = {ENCODING_JSON: {"schema": {"$ref": "#/components/schemas/TagHealthMessage"}, "example": examples.HEALTH}}
 
 
-router = APIRouter(tags=["ingest"])
+router = Router(tags=["ingest"])
 
 
 @router.post(
     "/ingest/health",
-    operation_id="ingest_health",
     summary="Report the health of a tag",
     description="Battery, temperature, firmware and more, each optional, of at most 1,024 bytes. About once a "
     "minute is enough; of more than five reports per second, the later ones are dropped.",

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Annotated, Any
 
 import segno
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
@@ -16,6 +16,7 @@ from dropanchor_schemas.wire import Reason, Rejection
 from dropanchor_service.api.http.access import secret_of
 from dropanchor_service.api.http.behind_proxy import prefix_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.contents import TEXT
 from dropanchor_service.api.routes.ingest import OfApp, OfTag, tag_of, why_refused
@@ -49,13 +50,12 @@ def _file(media_type: str, description: str) -> dict[int | str, dict[str, Any]]:
     return {200: {"content": {media_type: TEXT}, "description": description}}
 
 
-router = APIRouter(tags=["ingest"])
+router = Router(tags=["ingest"])
 _phones_of = ForEachSite(_phones)
 
 
 @router.get(
     "/ingest/phyphox",
-    operation_id="get_phyphox_experiment",
     summary="Get the experiment that makes the app phyphox send the motion of a tag",
     description="Open `phyphox://HOST/api/v1/ingest/phyphox?token=KEY` on the phone. The file holds the key.",
     response_class=Response,
@@ -70,7 +70,6 @@ async def get_phyphox_experiment(request: Request, query: Annotated[OfApp, Query
 
 @router.get(
     "/ingest/phyphox/code",
-    operation_id="get_phyphox_code",
     summary="Get the QR code that the app phyphox scans to load the experiment of a tag",
     response_class=Response,
     responses=_file(SVG, "The QR code.") | problems(Kind.INVALID_REQUEST),
@@ -90,7 +89,6 @@ def _address(request: Request) -> str:
 
 @router.post(
     "/ingest/phyphox",
-    operation_id="ingest_phyphox",
     summary="Send readings of a phone with the app phyphox",
     description="The address in the experiment. Readings become IMU samples of the tag, as those of Sensor Logger "
     "do. They are put in order by their times and used once each.",

@@ -8,7 +8,6 @@ import asyncio
 import time
 from collections.abc import AsyncIterator
 
-from fastapi import APIRouter
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from dropanchor_schemas.answers import SamplesAcknowledged
@@ -21,6 +20,7 @@ from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, i
 from dropanchor_service.api.http.closing import reason_of
 from dropanchor_service.api.http.connections import TooManyConnectionsError
 from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.ingest import take_samples
 from dropanchor_service.api.routes.shared_parts import shared_of
 from dropanchor_service.api.routes.site_of_request import parts_of, sites_of
@@ -208,7 +208,7 @@ class _Stream:
             )
 
 
-router = APIRouter()
+router = Router()
 """The WebSocket. OpenAPI has no WebSockets: `reference/rest.md` describes it."""
 
 

@@ -1,11 +1,12 @@
 """The route for what the tags of a site tell about north."""
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from starlette.responses import Response
 
 from dropanchor_schemas.north import SiteNorth
 from dropanchor_service.answers.north import site_north_of
 from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.api.routes.site_of_request import answers_of
 
@@ -23,12 +24,11 @@ _EXAMPLE = {
 }
 
 
-router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
+router = Router(tags=["site"], dependencies=[NO_QUERY])
 
 
 @router.get(
     "/site/north",
-    operation_id="get_site_north",
     summary="Get where north is, as the tags tell it whose start and heading were told",
     description="Nothing follows from it by itself. To apply it to all tags, put the site with `learned_rad` as "
     "its `declination_rad` and `std_rad` as its `declination_std_rad`: tags that know north by their own start go "

@@ -6,10 +6,11 @@ from typing import Annotated, Any
 from urllib.parse import unquote
 
 from fastapi import Depends, Path, Request
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, WithJsonSchema
 from starlette.responses import Response
 
 from dropanchor_schemas.keys import InvalidKeyError, checked_id
+from dropanchor_schemas.models import Exact
 from dropanchor_schemas.pose import TrackingState
 from dropanchor_schemas.sentences import said_by, say
 from dropanchor_schemas.site import ID_SCHEMA, Label
@@ -110,10 +111,8 @@ _NUMBER = r"-?[0-9]{1,9}(\.[0-9]{1,9})?"
 Ids = Annotated[str, Field(min_length=1, json_schema_extra={"format": "dropanchor-ids"})]
 
 
-class TagFilter(BaseModel):
+class TagFilter(Exact):
     """The query of a route that can return selected tags."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     tags: Annotated[list[Ids], AfterValidator(ids_of)] = Field(
         default=[],
@@ -170,10 +169,8 @@ TimeNs = Annotated[
 """A time as UTC in ns, or as ISO 8601 with a time zone. Seconds, milliseconds and microseconds are refused."""
 
 
-class AtTime(BaseModel):
+class AtTime(Exact):
     """The query of a route that can return the state at another time."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     at: TimeNs | None = Field(
         default=None,
@@ -187,10 +184,8 @@ class AtTime(BaseModel):
     )
 
 
-class LastInnovations(BaseModel):
+class LastInnovations(Exact):
     """The query of the route that explains a pose."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     last: int = Field(default=50, ge=1, le=300, description="How many of the newest innovations to return.")
 

@@ -2,14 +2,16 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Query, Request
+from fastapi import Path, Query, Request
 from fastapi.concurrency import run_in_threadpool
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from starlette.responses import Response
 
+from dropanchor_schemas.models import Exact
 from dropanchor_schemas.plans import PlanImage, UploadedPlanImage
 from dropanchor_schemas.sentences import said_by, say
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import plan_examples as examples
 from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
@@ -40,9 +42,7 @@ a GeoTIFF or comes with a world file.
 Put the `image` of the answer into a plan. The service keeps the last images that no plan uses."""
 
 
-class UploadQuery(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
+class UploadQuery(Exact):
     page: int = Field(default=1, ge=1, le=10_000, description="Page of a PDF.")
     world: Annotated[str, Field(pattern=rf"^{_NUMBER}(,{_NUMBER}){{5}}$")] | None = Field(
         default=None,
@@ -71,13 +71,12 @@ def _binary(*media_types: str) -> dict[str, Any]:
     return dict.fromkeys(media_types, BYTES)
 
 
-router = APIRouter(tags=["plans"])
+router = Router(tags=["plans"])
 _READER = PlanReader()
 
 
 @router.post(
     "/plan-images",
-    operation_id="upload_plan_image",
     summary="Upload the image of a floor plan",
     description=_DESCRIPTION,
     response_model=UploadedPlanImage,
@@ -104,7 +103,6 @@ async def upload_plan_image(request: Request, query: Annotated[UploadQuery, Quer
 
 @router.get(
     "/plan-images/{image}",
-    operation_id="get_plan_image",
     summary="Get the image of a floor plan",
     description="It never changes, so a client need not request it again.",
     response_class=Response,

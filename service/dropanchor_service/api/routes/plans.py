@@ -1,10 +1,11 @@
 """The routes for floor plans."""
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 
 from dropanchor_schemas.plans import Plan, PlanList
 from dropanchor_schemas.sentences import say
 from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import plan_examples as examples
 from dropanchor_service.api.routes.item_routes import Resource, add_item_routes
 from dropanchor_service.api.routes.parameters import NO_QUERY
@@ -35,5 +36,5 @@ def _plans() -> Resource[Plan]:
     )
 
 
-router = APIRouter(tags=["plans"], dependencies=[NO_QUERY])
+router = Router(tags=["plans"], dependencies=[NO_QUERY])
 add_item_routes(router, _plans())

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, Field
@@ -19,6 +19,7 @@ from dropanchor_service.answers.pose_at_time import NoPoseThenError, TooFarAhead
 from dropanchor_service.answers.times import iso_utc
 from dropanchor_service.api.formats import geojson
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.contents import schema_of
 from dropanchor_service.api.routes.known_tag import known_tag
@@ -80,7 +81,7 @@ def _offers(example: Answer, as_geojson: type[BaseModel]) -> dict[int | str, dic
     return {200: {"content": {geojson.JSON: {"example": example}, geojson.MEDIA_TYPE: features}}}
 
 
-router = APIRouter(tags=["poses"])
+router = Router(tags=["poses"])
 
 
 async def get_pose(tag: TagId, query: Annotated[PoseOfTag, Query()], request: Request) -> Response:
@@ -99,7 +100,6 @@ router.add_api_route(
     get_pose,
     methods=["GET"],
     route_class_override=PlainPose,
-    operation_id="get_pose",
     summary="Get the latest pose of a tag, or its pose at a time",
     response_model=TimedPose,
     responses=_offers(examples.POSE | {"t_utc": iso_utc(examples.POSE["t_ns"])}, TimedPoseFeature)
@@ -109,7 +109,6 @@ router.add_api_route(
 
 @router.get(
     "/tags/{tag}/explain",
-    operation_id="explain_pose",
     summary="Explain the latest pose of a tag",
     response_model=Explanation,
     responses=example_response(examples.EXPLANATION)
@@ -125,7 +124,6 @@ async def explain_pose(tag: TagId, query: Annotated[LastInnovations, Query()], r
 
 @router.get(
     "/poses",
-    operation_id="list_poses",
     summary="List the latest poses of all or selected tags",
     response_model=PoseList,
     responses=_offers(examples.POSE_LIST, PoseFeatureCollection) | problems(*_NEGOTIATION),

@@ -3,13 +3,14 @@
 from typing import Annotated
 from urllib.parse import unquote
 
-from fastapi import APIRouter, Depends, Path, Request
+from fastapi import Depends, Path, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.destinations import ReceiverNetwork, ReceiverNetworkList
 from dropanchor_schemas.sentences import said_by, say, with_stop
 from dropanchor_service.api.http.access import LOOPBACK, client_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
 from dropanchor_service.api.routes.site_of_request import parts_of
 from dropanchor_service.delivery.receiver_networks import AllowedNetwork, private_network
@@ -38,17 +39,16 @@ def _network(
 NetworkInPath = Annotated[str, Depends(_network)]
 
 
-router = APIRouter(tags=["destinations"], dependencies=[NO_QUERY])
+router = Router(tags=["destinations"], dependencies=[NO_QUERY])
 
 
 @router.get(
     "/receiver-networks",
-    operation_id="list_receiver_networks",
     summary="List the networks inside whose machines may receive events",
     response_model=ReceiverNetworkList,
     responses=example_response({"networks": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
 )
-def list_networks(request: Request) -> Response:
+def list_receiver_networks(request: Request) -> Response:
     networks = parts_of(request).events.channels.networks
     of_settings = [ReceiverNetwork(network=str(one), in_settings=True) for one in networks.of_settings]
     of_page = [ReceiverNetwork(network=one, in_settings=False) for one in networks.items.all]
@@ -57,14 +57,13 @@ def list_networks(request: Request) -> Response:
 
 @router.put(
     "/receiver-networks/{network}",
-    operation_id="allow_receiver_network",
     summary="Allow the machines of a network to receive events",
     description=_DESCRIPTION,
     response_model=ReceiverNetwork,
     responses=example_response(_EXAMPLE)
     | problems(Kind.NO_ACCESS_CONTROL, Kind.ITEMS_FULL, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
 )
-def allow_network(network: NetworkInPath, request: Request) -> Response:
+def allow_receiver_network(network: NetworkInPath, request: Request) -> Response:
     items = parts_of(request).events.channels.networks.items
     _refuse_anybody(request)
     with saving():
@@ -79,13 +78,12 @@ def allow_network(network: NetworkInPath, request: Request) -> Response:
 
 @router.delete(
     "/receiver-networks/{network}",
-    operation_id="remove_receiver_network",
     summary="Allow a network no longer",
     description="The next event is not sent there, unless the settings allow the network, too.",
     status_code=204,
     responses=problems(Kind.UNKNOWN_NETWORK, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
 )
-def remove_network(network: NetworkInPath, request: Request) -> Response:
+def remove_receiver_network(network: NetworkInPath, request: Request) -> Response:
     items = parts_of(request).events.channels.networks.items
     with saving():
         try:

@@ -4,11 +4,12 @@ import os
 from collections.abc import Iterator
 from typing import Annotated, Any, BinaryIO
 
-from fastapi import APIRouter, Body, Path, Request
+from fastapi import Body, Path, Request
 from starlette.responses import Response, StreamingResponse
 
 from dropanchor_schemas.recordings import RecordingList, RecordingRequest, RecordingState
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
@@ -31,12 +32,11 @@ def _file() -> dict[int | str, dict[str, Any]]:
     return {200: {"content": {MEDIA_TYPE: BYTES}}}
 
 
-router = APIRouter(tags=["recordings"], dependencies=[NO_QUERY])
+router = Router(tags=["recordings"], dependencies=[NO_QUERY])
 
 
 @router.get(
     "/recordings",
-    operation_id="list_recordings",
     summary="Get the state of the recorder and the list of files",
     response_model=RecordingList,
     responses=example_response(examples.RECORDINGS) | problems(Kind.NO_RECORDER, Kind.INVALID_REQUEST),
@@ -52,7 +52,6 @@ def list_recordings(request: Request) -> Response:
 
 @router.post(
     "/recordings",
-    operation_id="start_recording",
     summary="Start a recording of raw samples and poses",
     status_code=201,
     response_model=RecordingState,
@@ -72,7 +71,6 @@ def start_recording(wanted: Annotated[RecordingRequest, Body(examples=[{"tags": 
 
 @router.post(
     "/recordings/stop",
-    operation_id="stop_recording",
     summary="Stop the recording",
     response_model=RecordingState,
     description="The answer names the last `file`. It comes when the file is finished, at the latest after 10 s.",
@@ -88,7 +86,6 @@ def stop_recording(request: Request) -> Response:
 
 @router.get(
     "/recordings/{name}",
-    operation_id="get_recording",
     summary="Download a recording, to replay it or to open it in Foxglove or Lichtblick",
     response_class=StreamingResponse,
     description="The file of a running recording comes up to where it is, without its index.",

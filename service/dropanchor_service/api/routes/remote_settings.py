@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Header, Request
+from fastapi import Body, Header, Request
 from pydantic import ValidationError
 from starlette.responses import Response
 
@@ -11,6 +11,7 @@ from dropanchor_schemas.site import RemoteSettings
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.http.etags import etag_of, matches
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import NO_QUERY, TagId, example_response, json_response, saving
@@ -31,12 +32,11 @@ _PATCH = {
 }
 
 
-router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
+router = Router(tags=["tags"], dependencies=[NO_QUERY])
 
 
 @router.get(
     "/tags/{tag}/remote-settings",
-    operation_id="get_remote_settings",
     summary="Get what is set in the program of a tag, and what the program applies",
     response_model=RemoteSettingsStatus,
     responses=example_response(examples.REMOTE_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
@@ -48,7 +48,6 @@ async def get_remote_settings(tag: TagId, request: Request) -> Response:
 
 @router.patch(
     "/tags/{tag}/remote-settings",
-    operation_id="patch_remote_settings",
     summary="Set values in the program of a tag",
     description="The values in the body replace the current ones, the others stay; null leaves a value to the "
     "program. The program gets them over Zenoh at once, or when it is connected. With `If-Match`, nothing changes "

@@ -2,12 +2,14 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request
-from pydantic import BaseModel, ConfigDict, Field
+from fastapi import Query, Request
+from pydantic import Field
 from starlette.responses import Response
 
+from dropanchor_schemas.models import Exact
 from dropanchor_schemas.settings_values import SettingSource, SettingValueList
 from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.parameters import example_response, json_response
 from dropanchor_service.api.routes.site_of_request import answers_of
 from dropanchor_service.store.settings_values import values_of_site
@@ -37,21 +39,18 @@ _EXAMPLE = {
 }
 
 
-class SettingsQuery(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
+class SettingsQuery(Exact):
     source: list[SettingSource] = Field(
         default=[], description="Return only values from this source. Repeat the parameter for several."
     )
     limit: int = Field(default=1000, ge=1, le=100_000, description="Return at most this many values.")
 
 
-router = APIRouter(tags=["site"])
+router = Router(tags=["site"])
 
 
 @router.get(
     "/settings",
-    operation_id="list_settings",
     summary="List the values of settings, where they come from and what they hide",
     description=_DESCRIPTION,
     response_model=SettingValueList,

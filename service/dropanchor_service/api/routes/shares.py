@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 from urllib.parse import quote
 
-from fastapi import APIRouter, Body, Path, Request
+from fastapi import Body, Path, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.sentences import say
 from dropanchor_schemas.shares import NewShare, Share, ShareList, ShareRequest
 from dropanchor_service.api.http.behind_proxy import prefix_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
 from dropanchor_service.api.routes.shared_parts import shared_of
 from dropanchor_service.api.routes.site_of_request import parts_of, sites_of, trail_of
@@ -33,12 +34,11 @@ scope `read`. A link of a tag or a group reads these tags, the site and nothing 
 in its data folder."""
 
 
-router = APIRouter(tags=["shares"], dependencies=[NO_QUERY])
+router = Router(tags=["shares"], dependencies=[NO_QUERY])
 
 
 @router.get(
     "/shares",
-    operation_id="list_shares",
     summary="List the share links",
     response_model=ShareList,
     responses=example_response({"available": True, "shares": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
@@ -52,7 +52,6 @@ async def list_shares(request: Request) -> Response:
 
 @router.post(
     "/shares",
-    operation_id="create_share",
     summary="Create a share link",
     description=_DESCRIPTION,
     status_code=201,
@@ -95,7 +94,6 @@ def _no_access_control() -> ProblemError:
 
 @router.delete(
     "/shares/{share}",
-    operation_id="revoke_share",
     summary="Revoke a share link, which ends its streams",
     status_code=204,
     responses=problems(Kind.UNKNOWN_SHARE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Request
+from fastapi import Body, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.answers import AnchorList
@@ -10,6 +10,7 @@ from dropanchor_schemas.sentences import said_by, say
 from dropanchor_schemas.site import Anchor, Site
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.http.etags import Conditions
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import (
     NO_QUERY,
@@ -24,12 +25,11 @@ from dropanchor_service.api.routes.site_of_request import answers_of
 _BAD_CHANGE = (Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED)
 
 
-router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
+router = Router(tags=["site"], dependencies=[NO_QUERY])
 
 
 @router.get(
     "/site",
-    operation_id="get_site",
     summary="Get the site: its frame, georeference and anchors",
     description="The `ETag` of the answer can go into the `If-Match` of a change.",
     response_model=Site,
@@ -41,7 +41,6 @@ async def get_site(request: Request) -> Response:
 
 @router.put(
     "/site",
-    operation_id="put_site",
     summary="Replace the site's frame, georeference and anchors",
     response_model=Site,
     responses=example_response(examples.SITE) | problems(Kind.SITE_ID_FIXED, Kind.CHANGED_MEANWHILE, *_BAD_CHANGE),
@@ -57,7 +56,6 @@ def put_site(body: Annotated[Site, Body(examples=[examples.SITE])], allows: Cond
 
 @router.get(
     "/anchors",
-    operation_id="list_anchors",
     summary="List the anchors of the site",
     response_model=AnchorList,
     responses=example_response({"anchors": [examples.ANCHOR]}) | problems(Kind.INVALID_REQUEST),
@@ -69,7 +67,6 @@ async def list_anchors(request: Request) -> Response:
 
 @router.get(
     "/anchors/{anchor}",
-    operation_id="get_anchor",
     summary="Get an anchor",
     description="The `ETag` of the answer can go into the `If-Match` of a change.",
     response_model=Anchor,
@@ -84,7 +81,6 @@ async def get_anchor(anchor: AnchorId, request: Request) -> Response:
 
 @router.put(
     "/anchors/{anchor}",
-    operation_id="put_anchor",
     summary="Create or move an anchor",
     response_model=Anchor,
     responses=example_response(examples.ANCHOR)
@@ -113,7 +109,6 @@ def put_anchor(
 
 @router.delete(
     "/anchors/{anchor}",
-    operation_id="delete_anchor",
     summary="Remove an anchor from the site",
     status_code=204,
     responses=problems(Kind.UNKNOWN_ANCHOR, Kind.CHANGED_MEANWHILE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),

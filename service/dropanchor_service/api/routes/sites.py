@@ -15,6 +15,7 @@ from dropanchor_schemas.pose import SitePosesList
 from dropanchor_service.answers.answers import to_json
 from dropanchor_service.answers.site_summaries import summaries
 from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.below import below
 from dropanchor_service.api.routes.parameters import NO_QUERY, PoseQuery, example_response, json_response
@@ -23,7 +24,7 @@ from dropanchor_service.api.routes.site_of_request import SITE_IN_PATH, SITE_PRE
 from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.security.identity import Scope
 
-router = APIRouter()
+router = Router()
 
 
 def routes_of_sites(routers: Iterable[APIRouter]) -> Iterator[BaseRoute]:
@@ -38,7 +39,7 @@ def routes_of_sites(routers: Iterable[APIRouter]) -> Iterator[BaseRoute]:
 
 def _describe(route: APIRoute) -> None:
     """Give a route below a site an id of its own, the site among its parameters, and the refusal of an unknown one."""
-    route.operation_id = route.unique_id = f"{route.operation_id}_of_site"
+    route.operation_id = route.unique_id = f"{route.unique_id}_of_site"
     if route.response_field is not None:  # its name is the title of the schema
         route.response_field = copy(route.response_field)
         route.response_field.name = f"Response_{route.unique_id}"
@@ -54,7 +55,6 @@ def _with_unknown_site(responses: dict[int | str, dict[str, Any]]) -> dict[int |
 
 @router.get(
     "/sites",
-    operation_id="list_sites",
     summary="List the sites of the service",
     tags=["site"],
     response_model=SiteList,
@@ -68,7 +68,6 @@ def list_sites(request: Request) -> Response:
 
 @router.get(
     "/sites/poses",
-    operation_id="list_poses_of_sites",
     summary="List the latest poses of the tags of all sites",
     tags=["poses"],
     response_model=SitePosesList,

@@ -10,7 +10,7 @@ from threading import Event
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from numpy.typing import NDArray
 from pydantic import Field
 from starlette.responses import Response, StreamingResponse
@@ -18,6 +18,7 @@ from starlette.responses import Response, StreamingResponse
 from dropanchor_service.answers.answers import EVERYTHING, Answer, Answers, to_json
 from dropanchor_service.answers.pose_filter import PoseFilter
 from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import PoseQuery
 from dropanchor_service.api.routes.shared_parts import shared_of
@@ -58,12 +59,11 @@ def _event(name: str, frame: Answer) -> bytes:
     return b"event: " + name.encode() + b"\ndata: " + to_json(frame) + b"\n\n"
 
 
-router = APIRouter(tags=["poses"])
+router = Router(tags=["poses"])
 
 
 @router.get(
     "/stream",
-    operation_id="stream_poses",
     summary="Stream poses as they change",
     description=_DESCRIPTION,
     response_class=StreamingResponse,

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Query, Request
+from fastapi import Body, Query, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.answers import NewcomerList, PendingTagList, TagList, TimedTagStatus
@@ -15,6 +15,7 @@ from dropanchor_service.answers.care import care_of, health_answer
 from dropanchor_service.answers.times import iso_utc
 from dropanchor_service.api.http.errors import Kind, ProblemError, at, problems
 from dropanchor_service.api.http.etags import Conditions, etag_of
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import (
@@ -41,15 +42,14 @@ def _timed(status: Answer) -> Answer:
     return status | {f"{name}_utc": None if t_ns is None else iso_utc(t_ns) for name, t_ns in times.items()}
 
 
-router_of_all = APIRouter(tags=["tags"])
+router_of_all = Router(tags=["tags"])
 
 
-router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
+router = Router(tags=["tags"], dependencies=[NO_QUERY])
 
 
 @router_of_all.get(
     "/tags",
-    operation_id="list_tags",
     summary="List all tags that have sent messages or been configured",
     response_model=TagList,
     responses=example_response(examples.TAG_LIST) | problems(Kind.INVALID_REQUEST),
@@ -66,7 +66,6 @@ def list_tags(query: Annotated[TagFilter, Query()], request: Request) -> Respons
 
 @router.get(
     "/pending-tags",
-    operation_id="list_pending_tags",
     summary="List tags that have sent messages but are not admitted yet",
     description='With `unknown_tags = "quarantine"`, a tag stays in this list until you put its settings (`{}` is '
     "enough). With `accept`, a tag stays only while many tags are new at once, until its second message. The list "
@@ -81,7 +80,6 @@ def list_pending_tags(request: Request) -> Response:
 
 @router.get(
     "/newcomers",
-    operation_id="list_newcomers",
     summary="The former name of /pending-tags, until the next version",
     deprecated=True,
     response_model=NewcomerList,
@@ -94,7 +92,6 @@ def list_newcomers(request: Request) -> Response:
 
 @router.get(
     "/tags/{tag}",
-    operation_id="get_tag",
     summary="Get a tag",
     response_model=TimedTagStatus,
     responses=example_response(_timed(examples.TAG)) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
@@ -109,7 +106,6 @@ async def get_tag(tag: TagId, request: Request) -> Response:
 
 @router.get(
     "/tags/{tag}/settings",
-    operation_id="get_tag_settings",
     summary="Get the settings of a tag",
     response_model=TagSettings,
     responses=example_response(examples.TAG_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
@@ -121,7 +117,6 @@ async def get_tag_settings(tag: TagId, request: Request) -> Response:
 
 @router.put(
     "/tags/{tag}/settings",
-    operation_id="put_tag_settings",
     summary="Replace the settings of a tag",
     description="An unknown tag is registered. What the body leaves out is as in `tag_defaults` of the service's "
     "settings. The estimator of the tag restarts with the new settings, from "
@@ -144,7 +139,6 @@ def put_tag_settings(
 
 @router.delete(
     "/tags/{tag}",
-    operation_id="delete_tag",
     summary="Delete a tag: its settings, its counters and its pose",
     description="Its stored tracks stay. A tag that still sends is unknown from then on. With "
     '`unknown_tags = "accept"`, it is back with its next message, with the settings in `tag_defaults`. The `ETag` '

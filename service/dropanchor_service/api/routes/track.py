@@ -3,7 +3,7 @@
 from typing import Annotated, Any, Literal
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from pydantic import Field, field_validator
 from starlette.responses import Response
 
@@ -15,6 +15,7 @@ from dropanchor_service.answers.track_pages import TrackPage, track_page
 from dropanchor_service.api.formats import geojson
 from dropanchor_service.api.formats import track as track_formats
 from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.contents import TEXT, schema_of
 from dropanchor_service.api.routes.parameters import TagId
@@ -69,12 +70,11 @@ def _offers() -> dict[int | str, dict[str, Any]]:
     return {200: {"content": CONTENT | {"application/json": {"example": examples.TRACK}}}}
 
 
-router = APIRouter(tags=["poses"])
+router = Router(tags=["poses"])
 
 
 @router.get(
     "/tags/{tag}/track",
-    operation_id="get_track",
     summary="Get the track of a tag",
     description=_DESCRIPTION,
     response_model=Track,

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from pydantic import Field
 from starlette.responses import StreamingResponse
 
@@ -14,6 +14,7 @@ from dropanchor_service.answers.track_pages import TrackPage, track_page
 from dropanchor_service.api.formats import geojson
 from dropanchor_service.api.formats import track as track_formats
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import TagId
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
@@ -46,12 +47,11 @@ def _offers() -> dict[int | str, dict[str, Any]]:
     return {200: {"content": {default: CONTENT[default]} | CONTENT | {MEDIA_TYPES[PARQUET]: BYTES}}}
 
 
-router = APIRouter(tags=["poses"])
+router = Router(tags=["poses"])
 
 
 @router.get(
     "/tags/{tag}/track/file",
-    operation_id="export_track",
     summary="Export the track of a tag as a file",
     description=_DESCRIPTION,
     response_class=StreamingResponse,

@@ -2,13 +2,14 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request
+from fastapi import Query, Request
 from pydantic import Field
 from starlette.responses import Response
 
 from dropanchor_schemas.tracks import Tracks
 from dropanchor_service.answers.many_tracks import many_tracks
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import TagFilter, example_response, json_response
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, unreadable
@@ -28,12 +29,11 @@ class TracksQuery(TagFilter, Period):
     max_points: int = Field(default=300, ge=2, le=5000, description="The maximum number of points of a tag.")
 
 
-router = APIRouter(tags=["poses"])
+router = Router(tags=["poses"])
 
 
 @router.get(
     "/tracks",
-    operation_id="get_tracks",
     summary="Get figures and points of the tracks of many tags",
     description=_DESCRIPTION,
     response_model=Tracks,

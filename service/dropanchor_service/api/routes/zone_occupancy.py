@@ -2,31 +2,30 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request
-from pydantic import BaseModel, ConfigDict, Field
+from fastapi import Query, Request
+from pydantic import Field
 from starlette.responses import Response
 
+from dropanchor_schemas.models import Exact
 from dropanchor_schemas.zones import ZoneOccupancyList
 from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.parameters import example_response, json_response
 from dropanchor_service.api.routes.site_of_request import parts_of
 
-router = APIRouter(tags=["zones"])
+router = Router(tags=["zones"])
 
 
-class OccupancyQuery(BaseModel):
+class OccupancyQuery(Exact):
     """Whether the tags are named."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     names: bool = Field(default=False, description="Also list the tags in each zone.")
 
 
 @router.get(
     "/zone-occupancy",
-    operation_id="get_zone_occupancy",
     summary="Count or list the tags in each zone",
     description="A tag counts from its entry to its exit, whether or not the zone makes events of them. "
     "Zones without a tag are left out.",

@@ -1,10 +1,11 @@
 """The routes for zones, and for rules without a zone."""
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 
 from dropanchor_schemas.sentences import said_by, with_stop
 from dropanchor_schemas.zones import EventRule, EventRuleList, Zone, ZoneList
 from dropanchor_service.api.http.errors import Kind, ProblemError, at
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.item_routes import Resource, add_item_routes
 from dropanchor_service.api.routes.parameters import NO_QUERY
@@ -49,6 +50,6 @@ def _check_shape(zone: Zone, _: Request) -> None:
         raise ProblemError(Kind.SHAPE_REFUSED, at("body.shape", with_stop(said_by(error)))) from error
 
 
-router = APIRouter(tags=["zones"], dependencies=[NO_QUERY])
+router = Router(tags=["zones"], dependencies=[NO_QUERY])
 add_item_routes(router, _zones())
 add_item_routes(router, _rules())

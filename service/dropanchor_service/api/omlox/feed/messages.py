@@ -5,6 +5,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from dropanchor_schemas.models import Exact
+
 
 class Code(IntEnum):
     """The error codes of the standard."""
@@ -54,10 +56,8 @@ def request_of(text: str) -> Request:
         ) from None
 
 
-class Params(BaseModel):
+class Params(Exact):
     """The parameters of a subscription. Each condition may be one value or a list of values."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     token: str | None = None
     crs: Literal["local", "EPSG:4326"] | None = None

@@ -11,13 +11,13 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from fastapi import APIRouter
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from dropanchor_service.answers.answers import to_json
 from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, identify
 from dropanchor_service.api.http.connections import TooManyConnectionsError
 from dropanchor_service.api.http.errors import ProblemError
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.omlox.feed.messages import Code, FeedError, Request, params_of, request_of
 from dropanchor_service.api.omlox.feed.topics import Feed, feed_of
 from dropanchor_service.api.omlox.hub import Hub
@@ -48,7 +48,7 @@ class Subscription:
     identity: Identity | None
 
 
-router = APIRouter()
+router = Router()
 _numbers = itertools.count(1)
 
 

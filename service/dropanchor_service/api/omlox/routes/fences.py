@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Query
+from fastapi import Body, Query
 from starlette.responses import Response
 
 from dropanchor_service.api.http.errors import Kind
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.omlox.geojson import fence_feature, location_feature, motion_feature
 from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.hub_of_request import SiteHub
@@ -44,7 +45,7 @@ EXAMPLE = {
 }
 
 
-router = APIRouter(prefix="/fences", tags=["fences"], strict_content_type=LENIENT)
+router = Router(prefix="/fences", tags=["fences"], strict_content_type=LENIENT)
 
 
 def fences_around(tags: Sequence[Tag], hub: Hub, query: SpatialQuery) -> Response:
@@ -54,14 +55,13 @@ def fences_around(tags: Sequence[Tag], hub: Hub, query: SpatialQuery) -> Respons
     return json_response([hub.fences.answer(zone, projection) for zone in zones])
 
 
-@router.get("", operation_id="list_fence_ids", summary="List the ids of the fences", responses=errors())
-def list_ids(hub: SiteHub) -> list[str]:
+@router.get("", summary="List the ids of the fences", responses=errors())
+def list_fence_ids(hub: SiteHub) -> list[str]:
     return [str(hub.fences.id_of(zone.id)) for zone in hub.fences.all()]
 
 
 @router.get(
     "/summary",
-    operation_id="list_fences",
     summary="List the fences",
     response_model=list[Fence] | FeatureCollection,
     responses=errors(*_PLACED),
@@ -73,7 +73,6 @@ def list_fences(hub: SiteHub, query: Annotated[PlaceQuery, Query()]) -> Response
 
 @router.post(
     "",
-    operation_id="create_fence",
     summary="Create a fence",
     description="It is a zone of this service from then on: a polygon without holes, or a circle around a point.",
     status_code=201,
@@ -95,7 +94,6 @@ def create_fence(
 
 @router.delete(
     "",
-    operation_id="delete_fences",
     summary="Delete all fences, which are all zones of this service",
     status_code=204,
     responses=errors(Kind.NOT_SAVED),
@@ -108,7 +106,6 @@ def delete_fences(hub: SiteHub) -> Response:
 
 @router.get(
     "/{fence_id}",
-    operation_id="get_fence",
     summary="Get a fence",
     response_model=Fence | Feature,
     responses=errors(_UNKNOWN, *_PLACED),
@@ -119,7 +116,6 @@ def get_fence(hub: SiteHub, fence_id: FenceId, query: Annotated[PlaceQuery, Quer
 
 @router.delete(
     "/{fence_id}",
-    operation_id="delete_fence",
     summary="Delete a fence",
     description="Its events stay. What is inside makes no exit.",
     status_code=204,
@@ -132,7 +128,6 @@ def delete_fence(hub: SiteHub, fence_id: FenceId) -> Response:
 
 @router.put(
     "/{fence_id}",
-    operation_id="put_fence",
     summary="Change a fence",
     description="What only the zone has, such as the tags it concerns and its delay, stays as it is.",
     status_code=204,
@@ -152,47 +147,43 @@ def put_fence(
 
 @router.get(
     "/{fence_id}/locations",
-    operation_id="list_fence_locations",
     summary="List the locations of the tags in a fence",
     response_model=list[Location] | FeatureCollection,
     responses=errors(*_INSIDE, *_PLACED),
 )
-def list_locations(hub: SiteHub, fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
+def list_fence_locations(hub: SiteHub, fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
     tags = _tags_in(hub, fence_id, query)
     return many(hub.places.of_tags(tags, query.projection(hub)), query, location_feature)
 
 
 @router.get(
     "/{fence_id}/motions",
-    operation_id="list_fence_motions",
     summary="List the motions of the trackables in a fence",
     response_model=list[TrackableMotion] | FeatureCollection,
     responses=errors(*_INSIDE, *_PLACED),
 )
-def list_motions(hub: SiteHub, fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
+def list_fence_motions(hub: SiteHub, fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
     assets = hub.assets.of_tags(_tags_in(hub, fence_id, query))
     return many(hub.motions(assets, query.projection(hub)), query, motion_feature)
 
 
 @router.get(
     "/{fence_id}/providers",
-    operation_id="list_fence_providers",
     summary="List the tags in a fence",
     response_model=list[LocationProvider],
     responses=errors(*_INSIDE),
 )
-def list_providers(hub: SiteHub, fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
+def list_fence_providers(hub: SiteHub, fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
     return json_response(hub.providers(_tags_in(hub, fence_id, query)))
 
 
 @router.get(
     "/{fence_id}/trackables",
-    operation_id="list_fence_trackables",
     summary="List the trackables in a fence",
     response_model=list[Trackable],
     responses=errors(*_INSIDE),
 )
-def list_trackables(hub: SiteHub, fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
+def list_fence_trackables(hub: SiteHub, fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
     return json_response(hub.trackables(hub.assets.of_tags(_tags_in(hub, fence_id, query))))
 
 

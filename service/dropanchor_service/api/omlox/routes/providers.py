@@ -2,11 +2,12 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Query
+from fastapi import Body, Query
 from starlette.responses import Response
 
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.omlox.geojson import location_feature
 from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.hub_of_request import SiteHub
@@ -39,17 +40,16 @@ TAKES_NO_POSITIONS = (
 )
 
 
-router = APIRouter(prefix="/providers", tags=["providers"], strict_content_type=LENIENT)
+router = Router(prefix="/providers", tags=["providers"], strict_content_type=LENIENT)
 
 
-@router.get("", operation_id="list_provider_ids", summary="List the ids of the tags", responses=errors())
-def list_ids(hub: SiteHub) -> list[str]:
+@router.get("", summary="List the ids of the tags", responses=errors())
+def list_provider_ids(hub: SiteHub) -> list[str]:
     return [tag.name for tag in hub.answers.tags.listed()]
 
 
 @router.get(
     "/summary",
-    operation_id="list_providers",
     summary="List the tags as location providers",
     response_model=list[LocationProvider],
     responses=errors(),
@@ -60,7 +60,6 @@ def list_providers(hub: SiteHub) -> Response:
 
 @router.get(
     "/locations",
-    operation_id="list_locations",
     summary="List the locations of all tags whose place is known",
     response_model=list[Location] | FeatureCollection,
     responses=errors(Kind.NOT_GEOREFERENCED),
@@ -71,7 +70,6 @@ def list_locations(hub: SiteHub, query: Annotated[PlaceQuery, Query()]) -> Respo
 
 @router.post(
     "",
-    operation_id="create_provider",
     summary="Register a tag",
     status_code=201,
     response_model=LocationProvider,
@@ -110,7 +108,6 @@ for what, path in (("location", "locations"), ("proximity", "proximities")):
 
 @router.get(
     "/{provider_id}",
-    operation_id="get_provider",
     summary="Get a tag as location provider",
     response_model=LocationProvider,
     responses=errors(_UNKNOWN),
@@ -121,7 +118,6 @@ def get_provider(hub: SiteHub, provider_id: ProviderId) -> Response:
 
 @router.put(
     "/{provider_id}",
-    operation_id="put_provider",
     summary="Set the name and the properties of a tag",
     status_code=204,
     responses=errors(_UNKNOWN, Kind.ID_DIFFERS, *_SAVED),
@@ -137,7 +133,6 @@ def put_provider(
 
 @router.delete(
     "/{provider_id}",
-    operation_id="delete_provider",
     summary="Delete a tag: its settings, its counters and its pose",
     description="A tag that still sends is back with its next message.",
     status_code=204,
@@ -155,12 +150,11 @@ def delete_provider(hub: SiteHub, provider_id: ProviderId) -> Response:
 
 @router.get(
     "/{provider_id}/location",
-    operation_id="get_provider_location",
     summary="Get the location of a tag",
     response_model=Location | Feature,
     responses=errors(_UNKNOWN, Kind.NO_LOCATION, Kind.NOT_GEOREFERENCED),
 )
-def get_location(hub: SiteHub, provider_id: ProviderId, query: Annotated[PlaceQuery, Query()]) -> Response:
+def get_provider_location(hub: SiteHub, provider_id: ProviderId, query: Annotated[PlaceQuery, Query()]) -> Response:
     tag = known_tag(hub.answers, provider_id)
     locations = hub.places.of_tags([tag], query.projection(hub))
     if not locations:
@@ -170,23 +164,21 @@ def get_location(hub: SiteHub, provider_id: ProviderId, query: Annotated[PlaceQu
 
 @router.get(
     "/{provider_id}/trackables",
-    operation_id="list_provider_trackables",
     summary="List the trackable that carries a tag",
     response_model=list[Trackable],
     responses=errors(_UNKNOWN),
 )
-def list_trackables(hub: SiteHub, provider_id: ProviderId) -> Response:
+def list_provider_trackables(hub: SiteHub, provider_id: ProviderId) -> Response:
     return json_response(hub.trackables(hub.assets.of_tags([known_tag(hub.answers, provider_id)])))
 
 
 @router.get(
     "/{provider_id}/fences",
-    operation_id="list_provider_fences",
     summary="List the fences in which a tag is",
     response_model=list[Fence],
     responses=errors(_UNKNOWN, Kind.EVENTS_UNREADABLE),
 )
-def list_fences(hub: SiteHub, provider_id: ProviderId, query: Annotated[SpatialQuery, Query()]) -> Response:
+def list_provider_fences(hub: SiteHub, provider_id: ProviderId, query: Annotated[SpatialQuery, Query()]) -> Response:
     return fences_around([known_tag(hub.answers, provider_id)], hub, query)
 
 

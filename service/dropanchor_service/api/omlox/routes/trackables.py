@@ -2,10 +2,11 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Query
+from fastapi import Body, Query
 from starlette.responses import Response
 
 from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.omlox.assets import Asset
 from dropanchor_service.api.omlox.geojson import location_feature, motion_feature
 from dropanchor_service.api.omlox.hub import Hub
@@ -34,7 +35,7 @@ _SAVED = (Kind.ITEMS_FULL, Kind.PROVIDER_ASSIGNED, Kind.BODY_TOO_LARGE, Kind.NOT
 EXAMPLE = {"type": "virtual", "name": "Forklift 3", "location_providers": ["tag-1"], "properties": {"fleet": "north"}}
 
 
-router = APIRouter(prefix="/trackables", tags=["trackables"], strict_content_type=LENIENT)
+router = Router(prefix="/trackables", tags=["trackables"], strict_content_type=LENIENT)
 
 
 def found(hub: Hub, identifier: TrackableId) -> Asset:
@@ -45,14 +46,13 @@ def found(hub: Hub, identifier: TrackableId) -> Asset:
     return asset
 
 
-@router.get("", operation_id="list_trackable_ids", summary="List the ids of the trackables", responses=errors())
-def list_ids(hub: SiteHub) -> list[str]:
+@router.get("", summary="List the ids of the trackables", responses=errors())
+def list_trackable_ids(hub: SiteHub) -> list[str]:
     return [str(asset.trackable.id) for asset in hub.assets.all()]
 
 
 @router.get(
     "/summary",
-    operation_id="list_trackables",
     summary="List the trackables",
     response_model=list[Trackable],
     responses=errors(),
@@ -63,7 +63,6 @@ def list_trackables(hub: SiteHub) -> Response:
 
 @router.get(
     "/motions",
-    operation_id="list_motions",
     summary="List the motions of all trackables whose place is known",
     response_model=list[TrackableMotion] | FeatureCollection,
     responses=errors(*_PLACED),
@@ -74,7 +73,6 @@ def list_motions(hub: SiteHub, query: Annotated[PlaceQuery, Query()]) -> Respons
 
 @router.post(
     "",
-    operation_id="create_trackable",
     summary="Create a trackable",
     description="A tag that it lists belongs to it from then on, instead of to a trackable of its own.",
     status_code=201,
@@ -92,7 +90,6 @@ def create_trackable(
 
 @router.delete(
     "",
-    operation_id="delete_trackables",
     summary="Delete all trackables that clients have created",
     status_code=204,
     responses=errors(Kind.NOT_SAVED),
@@ -106,7 +103,6 @@ def delete_trackables(hub: SiteHub) -> Response:
 
 @router.get(
     "/{trackable_id}",
-    operation_id="get_trackable",
     summary="Get a trackable",
     response_model=Trackable,
     responses=errors(_UNKNOWN),
@@ -117,7 +113,6 @@ def get_trackable(hub: SiteHub, trackable_id: TrackableId) -> Response:
 
 @router.delete(
     "/{trackable_id}",
-    operation_id="delete_trackable",
     summary="Delete a trackable that a client has created",
     description="Its tags get trackables of their own again.",
     status_code=204,
@@ -130,7 +125,6 @@ def delete_trackable(hub: SiteHub, trackable_id: TrackableId) -> Response:
 
 @router.put(
     "/{trackable_id}",
-    operation_id="put_trackable",
     summary="Change a trackable",
     description="The name of a trackable that stands for a tag is the name of the tag.",
     response_model=Trackable,
@@ -147,12 +141,11 @@ def put_trackable(
 
 @router.get(
     "/{trackable_id}/location",
-    operation_id="get_trackable_location",
     summary="Get the location of a trackable: of its tag whose place is known best",
     response_model=Location | Feature,
     responses=errors(_UNKNOWN, Kind.NO_LOCATION, *_PLACED),
 )
-def get_location(hub: SiteHub, trackable_id: TrackableId, query: Annotated[PlaceQuery, Query()]) -> Response:
+def get_trackable_location(hub: SiteHub, trackable_id: TrackableId, query: Annotated[PlaceQuery, Query()]) -> Response:
     tags = hub.assets.tags_of(found(hub, trackable_id).trackable)
     best = best_of(hub.places.of_tags(tags, query.projection(hub)))
     if best is None:
@@ -162,19 +155,19 @@ def get_location(hub: SiteHub, trackable_id: TrackableId, query: Annotated[Place
 
 @router.get(
     "/{trackable_id}/locations",
-    operation_id="list_trackable_locations",
     summary="List the locations of the tags of a trackable, as far as their place is known",
     response_model=list[Location] | FeatureCollection,
     responses=errors(_UNKNOWN, *_PLACED),
 )
-def list_locations(hub: SiteHub, trackable_id: TrackableId, query: Annotated[PlaceQuery, Query()]) -> Response:
+def list_trackable_locations(
+    hub: SiteHub, trackable_id: TrackableId, query: Annotated[PlaceQuery, Query()]
+) -> Response:
     tags = hub.assets.tags_of(found(hub, trackable_id).trackable)
     return many(hub.places.of_tags(tags, query.projection(hub)), query, location_feature)
 
 
 @router.get(
     "/{trackable_id}/motion",
-    operation_id="get_motion",
     summary="Get the motion of a trackable",
     response_model=TrackableMotion | Feature,
     responses=errors(_UNKNOWN, Kind.NO_LOCATION, *_PLACED),
@@ -189,21 +182,19 @@ def get_motion(hub: SiteHub, trackable_id: TrackableId, query: Annotated[PlaceQu
 
 @router.get(
     "/{trackable_id}/providers",
-    operation_id="list_trackable_providers",
     summary="List the tags of a trackable",
     response_model=list[LocationProvider],
     responses=errors(_UNKNOWN),
 )
-def list_providers(hub: SiteHub, trackable_id: TrackableId) -> Response:
+def list_trackable_providers(hub: SiteHub, trackable_id: TrackableId) -> Response:
     return json_response(hub.providers(hub.assets.tags_of(found(hub, trackable_id).trackable)))
 
 
 @router.get(
     "/{trackable_id}/fences",
-    operation_id="list_trackable_fences",
     summary="List the fences in which a trackable is",
     response_model=list[Fence],
     responses=errors(_UNKNOWN, Kind.EVENTS_UNREADABLE),
 )
-def list_fences(hub: SiteHub, trackable_id: TrackableId, query: Annotated[SpatialQuery, Query()]) -> Response:
+def list_trackable_fences(hub: SiteHub, trackable_id: TrackableId, query: Annotated[SpatialQuery, Query()]) -> Response:
     return fences_around(hub.assets.tags_of(found(hub, trackable_id).trackable), hub, query)

@@ -2,10 +2,11 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 from starlette.responses import Response
 
 from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.omlox.hub_of_request import SiteHub
 from dropanchor_service.api.omlox.models import Zone
 from dropanchor_service.api.omlox.parameters import ZoneId, errors
@@ -15,17 +16,16 @@ from dropanchor_service.api.routes.parameters import json_response
 ForeignId = Annotated[str | None, Query(description="Return only the zone of the anchor with this id.")]
 
 
-router = APIRouter(prefix="/zones", tags=["zones"])
+router = Router(prefix="/zones", tags=["zones"])
 
 
-@router.get("", operation_id="list_zone_ids", summary="List the ids of the zones", responses=errors())
-def list_ids(hub: SiteHub, foreign_id: ForeignId = None) -> list[str]:
+@router.get("", summary="List the ids of the zones", responses=errors())
+def list_zone_ids(hub: SiteHub, foreign_id: ForeignId = None) -> list[str]:
     return [zone["id"] for zone in zone_answers(hub.answers.site.site, foreign_id)]
 
 
 @router.get(
     "/summary",
-    operation_id="list_zones",
     summary="List the zones: one around each anchor",
     response_model=list[Zone],
     responses=errors(),
@@ -36,7 +36,6 @@ def list_zones(hub: SiteHub, foreign_id: ForeignId = None) -> Response:
 
 @router.get(
     "/{zone_id}",
-    operation_id="get_zone",
     summary="Get a zone",
     response_model=Zone,
     responses=errors(Kind.UNKNOWN_ZONE),
