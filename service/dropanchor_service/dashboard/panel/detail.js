@@ -13,7 +13,7 @@ import { applyNorth, isNorthOffered } from "./north.js";
 import { Plots } from "./plots.js";
 import { showUncertainty } from "./uncertainty.js";
 import { symbol } from "../map/symbols.js";
-import { partOf, write } from "../page/parts.js";
+import { partOf, write, writeOrHide } from "../page/parts.js";
 
 /** @typedef {import("../data/fleet.js").Fleet} Fleet */
 
@@ -94,8 +94,7 @@ export class Detail {
     write(partOf(this.panel, "meaning"), state.meaning);
     write(partOf(this.panel, "reason"), reason ? words(reason) : "");
     const hint = current ? hintOf(this.fleet, this.roster, row) : "";
-    write(partOf(this.panel, "hint"), hint);
-    partOf(this.panel, "hint").hidden = hint === "";
+    writeOrHide(partOf(this.panel, "hint"), hint);
     this.follow.setAttribute("aria-pressed", String(this.choice.follow));
     partOf(this.panel, "json").setAttribute("href", api(`tags/${encodeURIComponent(name)}/pose`).href);
     partOf(this.panel, "json").hidden = hasKey() || this.fleet.past || !this.fleet.hasPose(row); // a link carries no key

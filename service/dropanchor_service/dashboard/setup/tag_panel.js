@@ -5,7 +5,7 @@ import { Saving } from "../data/saving.js";
 import { confirmed } from "./confirm.js";
 import { fillForm, noteSent, numberOf, patchOf, typedIn } from "./tag_form.js";
 import { t } from "../i18n/language.js";
-import { partOf } from "../page/parts.js";
+import { fieldOf, partOf } from "../page/parts.js";
 
 /** @typedef {import("../data/changes.js").Seen} Seen */
 
@@ -117,7 +117,7 @@ export class TagPanel {
     const row = this.fleet.row(this.#tag);
     if (this.#isPlaced(row)) this.#beginAt(drawnX[row], drawnY[row]);
     else this.start.begin({ x: 0, y: 0, heading_rad: null });
-    this.#startField("x").select();
+    fieldOf(this.startForm, "x").select();
   }
 
   /** @param {number} row */
@@ -149,24 +149,19 @@ export class TagPanel {
     name.focus();
   }
 
-  /** @param {string} name */
-  #startField(name) {
-    return /** @type {HTMLInputElement} */ (this.startForm.elements.namedItem(name));
-  }
-
   #showStart() {
     const { draft, degrees } = this.start;
     this.startForm.hidden = draft === null;
     partOf(this.panel, "start").hidden = draft !== null;
     if (!draft) return;
-    for (const name of /** @type {const} */ (["x", "y"])) writeMeasure(this.#startField(name), draft[name]);
-    const heading = this.#startField("heading");
+    for (const name of /** @type {const} */ (["x", "y"])) writeMeasure(fieldOf(this.startForm, name), draft[name]);
+    const heading = fieldOf(this.startForm, "heading");
     if (numberOf(heading) !== degrees) heading.value = degrees === null ? "" : String(degrees);
   }
 
   #typedStart() {
-    const [x, y] = ["x", "y"].map((name) => readMeasure(this.#startField(name)));
-    if (x !== null && y !== null) this.start.type(x, y, numberOf(this.#startField("heading")));
+    const [x, y] = ["x", "y"].map((name) => readMeasure(fieldOf(this.startForm, name)));
+    if (x !== null && y !== null) this.start.type(x, y, numberOf(fieldOf(this.startForm, "heading")));
   }
 
   /** @param {Event} event */
