@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dropanchor_evaluation.climbs import CLIMBS, Barometer, HeightScore, climbing, height_score
 from dropanchor_evaluation.product.rows import Row
 from dropanchor_evaluation.product.runs import TagRun, sources, tag_run
 from dropanchor_evaluation.product.scores import RowScore, score, summary
 from dropanchor_evaluation.product.work import run_tags
 from dropanchor_service.estimation.columns import HeightMotion
 from dropanchor_service.estimation.fleet.engine import FleetEngine
+from support.climbs import CLIMBS, Barometer, HeightScore, climbing, height_score
 
 SEEDS = range(20_000, 20_008)
 ROW = Row("S5", "9-axis", "everything", "known")

@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 import pytest
 
-from dropanchor_evaluation.climbs import CLIMBS, Barometer, Height, climbing
 from dropanchor_evaluation.product.rows import Row
 from dropanchor_evaluation.product.runs import TagRun, sources, tag_run
 from dropanchor_evaluation.product.work import run_tags
-from dropanchor_evaluation.storeys import FloorScore, floor_score, lift, slammed, warmed
 from dropanchor_service.estimation.fleet.engine import FleetEngine
+from support.climbs import CLIMBS, Barometer, Height, climbing
+from support.storeys import FloorScore, floor_score, lift, slammed, warmed
 
 SEEDS = range(5000, 5008)
 ROW = Row("S5", "9-axis", "everything", "known")
