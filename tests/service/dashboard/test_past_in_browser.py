@@ -11,11 +11,12 @@ import pyarrow.parquet as pq
 import pytest
 from playwright.sync_api import Browser, expect
 
+from dropanchor_schemas.events import EventType
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.estimation.columns import Frame, State
-from dropanchor_service.events.drafts import Stay
+from dropanchor_service.events.drafts import Draft, Stay
 from dropanchor_service.history.storage import Retention
 from service.dashboard.place import Place, live_api_bench
 from support.axe import violations
@@ -51,7 +52,10 @@ def past(tmp_path: Path) -> Iterator[tuple[Place, int]]:
     bench = live_api_bench(folder=tmp_path, retention=RETENTION)
     end_ns = time.time_ns() // SECOND * SECOND - 3600 * SECOND
     events = EventParts.in_memory("default")
-    events.store.commit([], {}, [Stay("first", "dock", end_ns - 4000 * SECOND, end_ns - 100 * SECOND)])
+    entered = {"t_ns": end_ns - 100 * SECOND, "since_ns": end_ns - 101 * SECOND, "zone": "dock", "name": "Dock"}
+    later = {**entered, "t_ns": end_ns + 600 * SECOND}
+    drafts = [Draft(EventType.ZONE_ENTER, "first", data) for data in (entered, later)]
+    events.store.commit(drafts, {}, [Stay("first", "dock", end_ns - 4000 * SECOND, end_ns - 100 * SECOND)])
     with running_server(bench.app(DASHBOARD, events=events), bench.stopping) as port:
         place = Place(bench, f"http://127.0.0.1:{port}/")
         write_past(place, end_ns)
@@ -101,6 +105,13 @@ def test_a_link_leads_to_a_moment_of_the_past_and_back_to_the_present(
             "second": "ambiguous",
             "turned": "relative",
         }
+        page.page.locator("#events summary").click()
+        (event,) = page.page.locator("#events li").all()  # not the one after the period
+        assert "entered Dock" in event.inner_text()
+        marks = page.page.locator(".past path[data-part='events']").get_attribute("d") or ""
+        assert marks.startswith(f"M{round(1000 * (60 * MINUTES - 100) / (60 * MINUTES))} ")
+        event.get_by_role("button").click()
+        page.wait_for(f"Math.abs(dropanchor.tags()[0]?.x - {60 * MINUTES - 110}) < 0.01")  # ten seconds before
         page.page.locator("[data-part='leave']").click()
         page.wait_for("dropanchor.past() === false && dropanchor.tags()[0].x === -4")
         expect(page.page.locator("#status-text")).to_have_text("Live")

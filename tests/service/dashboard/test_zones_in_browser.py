@@ -91,12 +91,12 @@ def test_the_lists_of_the_present_are_hidden_while_the_page_shows_the_past(chrom
         page.wait_for("dropanchor.events() && dropanchor.zones().yard === 1")
         lists = [page.page.locator("#events"), page.page.locator("#zone-list")]
         lists[1].locator("summary").click()
-        sentence = page.page.get_by_text("The lists of zones and events are hidden")
+        sentence = page.page.get_by_text("Zones and alerts are hidden")
         expect(sentence).to_be_hidden()
         page.page.locator("#history").click()
         expect(sentence).to_be_visible()
-        for hidden in lists:
-            expect(hidden).to_be_hidden()
+        expect(lists[0]).to_be_visible()
+        expect(lists[1]).to_be_hidden()
         page.page.locator("#history").click()
         expect(sentence).to_be_hidden()
         expect(lists[1]).to_contain_text("1 tag inside")

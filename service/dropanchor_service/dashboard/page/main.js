@@ -75,6 +75,7 @@ const past = new Past({ fleet, trails, roster, evidence, map, choice, connection
 detail.heights.floors = () => plans.floors.all;
 detail.heightsInPast = (/** @type {string} */ tag) => past.heightsOf(tag);
 const zones = new Zones(map, connection, setup.changes, (tag) => fleet.row(tag) >= 0 && select(tag), panels);
+zones.follow(past);
 const finding = new Finding({ map, fleet, roster, choice, table, setup, plans, zones, measure, past, panels, select, pickAll, byId });
 const alerts = new Alerts(byId("alerts"), byId("confirm"), connection, zones, setup.changes, panels);
 

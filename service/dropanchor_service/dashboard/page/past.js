@@ -39,6 +39,8 @@ const ADDRESS_MS = 1000;
 
 export class Past {
   active = false;
+  /** Follow the change between present and past. */
+  became = (/** @type {boolean} */ _isPast) => {};
   replay = new Replay();
   #times = new StoredTimes();
   #trails = new PastTrails();
@@ -140,6 +142,7 @@ export class Past {
     else fleet.current = false;
     byId("spoken").textContent = t(active ? "past.shows" : "past.shows_present");
     byId("past-figures").hidden = true;
+    this.became(active);
     this.page.updatePanels();
   }
 

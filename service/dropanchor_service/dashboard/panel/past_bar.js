@@ -90,6 +90,11 @@ export class PastBar extends EventTarget {
     this.update();
   }
 
+  /** Mark times on the strip below the slider. @param {import("../data/periods.js").Period[]} times */
+  mark(times) {
+    this.#part("events").setAttribute("d", stripPath(times, this.replay));
+  }
+
   #showPeriod() {
     this.#write("from", this.replay.from_ms);
     this.#write("to", this.replay.to_ms);

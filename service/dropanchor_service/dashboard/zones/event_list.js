@@ -11,7 +11,7 @@ export class EventList {
   /** @type {Map<string, HTMLElement>} */
   #lines = new Map();
 
-  /** @param {HTMLDetailsElement} box @param {import("./event_log.js").EventLog} log @param {(event: ServiceEvent) => void} pick */
+  /** @param {HTMLDetailsElement} box @param {import("./event_log.js").EventLog | import("./past_events.js").PastEvents} log @param {(event: ServiceEvent) => void} pick */
   constructor(box, log, pick) {
     this.log = log;
     this.pick = pick;

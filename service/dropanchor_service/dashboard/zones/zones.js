@@ -8,6 +8,7 @@ import { EventLog } from "./event_log.js";
 import { Headcount } from "./headcount.js";
 import { Handles } from "./handles.js";
 import { withCorner } from "./shape_edit.js";
+import { PastEvents } from "./past_events.js";
 import { ZoneForm } from "./zone_form.js";
 import { ZoneList } from "./zone_list.js";
 import { ZoneStore } from "./zone_store.js";
@@ -18,6 +19,8 @@ const PADDING_PX = 64;
 const MIN_SIDE_M = 2;
 /** Size of a new circle, and distance of corners that the keyboard adds from the centre of the map. */
 const NEW_PX = 80;
+/** A click on an event of the past shows what was before it. */
+const BEFORE_MS = 10_000;
 /** Between two requests for the number of tags inside, however many events there are. */
 const REFRESH_MS = 500;
 
@@ -26,6 +29,8 @@ export class Zones {
   log = new EventLog();
   /** Id of a zone. @type {string | null} */
   selected = null;
+  /** What the events belong to while the page shows the past. @type {import("../data/replay.js").Replay | null} */
+  replay = null;
   #timer = 0;
 
   /** @param {import("../map/map.js").LiveMap} map @param {import("../data/connection.js").Connection} connection
@@ -81,8 +86,24 @@ export class Zones {
     this.#update();
   }
 
+  /** List the events of the past, which a click leads to, or those of the present. @param {import("../page/past.js").Past} past */
+  follow(past) {
+    const events = new PastEvents();
+    past.replay.addEventListener("period", () => events.load(past.replay));
+    events.addEventListener("change", () => {
+      past.bar.mark(events.times);
+      this.events.update();
+    });
+    past.became = (isPast) => {
+      this.events.log = isPast ? events : this.log;
+      this.replay = isPast ? past.replay : null;
+      this.events.update();
+    };
+  }
+
   /** Show the tag and the zone of an event. @param {import("./words.js").ServiceEvent} event */
-  pick({ subject, data }) {
+  pick({ subject, data, time }) {
+    this.replay?.seek(Math.max(this.replay.from_ms, Date.parse(time) - BEFORE_MS));
     if (data.zone !== null) this.select(data.zone);
     this.selectTag(subject);
   }

@@ -1,7 +1,7 @@
 /** Zones and events. */
 
 export default {
-  "zones.hidden": "Die Seite zeigt die Vergangenheit. Die Listen der Zonen und Ereignisse sind ausgeblendet, weil sie die Gegenwart zeigen.",
+  "zones.hidden": "Die Seite zeigt die Vergangenheit und die Ereignisse dieser Zeit. Zonen und Alarme sind ausgeblendet, weil sie die Gegenwart zeigen.",
   "zones.title": "Zonen",
   "zones.none": "noch keine",
   "zones.outdated": "veraltet",

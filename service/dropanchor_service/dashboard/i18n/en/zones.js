@@ -1,7 +1,7 @@
 /** Zones and events. */
 
 export default {
-  "zones.hidden": "The page shows the past. The lists of zones and events are hidden, because they show the present.",
+  "zones.hidden": "The page shows the past, and the events of that period. Zones and alerts are hidden, because they show the present.",
   "zones.title": "Zones",
   "zones.none": "none yet",
   "zones.outdated": "out of date",
