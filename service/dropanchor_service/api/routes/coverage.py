@@ -10,10 +10,9 @@ from dropanchor_schemas.tracks import Coverage
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.parameters import TimeNs, example_response, json_response
-from dropanchor_service.api.routes.period import history_of, require_order, unreadable
+from dropanchor_service.api.routes.period import history_of, reading_history, require_order
 from dropanchor_service.api.routes.site_of_request import answers_of
 from dropanchor_service.history.coverage import NO_COVERAGE
-from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.tracks import Tracks
 
 _EXAMPLE = {
@@ -59,10 +58,8 @@ router = Router(tags=["poses"])
 )
 def get_history_coverage(query: Annotated[CoverageQuery, Query()], request: Request) -> Response:
     tracks = history_of(answers_of(request))
-    try:
+    with reading_history():
         return json_response(_coverage(tracks, query))
-    except HistoryError as error:
-        raise unreadable(error) from error
 
 
 def _coverage(tracks: Tracks, query: CoverageQuery) -> dict[str, Any]:

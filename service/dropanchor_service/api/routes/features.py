@@ -28,9 +28,8 @@ from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.contents import schema_of
 from dropanchor_service.api.routes.feature_collections import COLLECTIONS, Span, box_of, features_of
 from dropanchor_service.api.routes.parameters import NO_QUERY, id_of, json_response
-from dropanchor_service.api.routes.period import unreadable
+from dropanchor_service.api.routes.period import reading_history
 from dropanchor_service.api.routes.site_of_request import parts_of
-from dropanchor_service.history.errors import HistoryError, TooMuchError
 
 CRS84 = "http://www.opengis.net/def/crs/OGC/1.3/CRS84"
 CONFORMS_TO = [f"http://www.opengis.net/spec/ogcapi-features-1/1.0/conf/{name}" for name in ("core", "geojson")]
@@ -201,9 +200,5 @@ def _page(request: Request, collection: str, query: ItemsQuery, rel: str, offset
 
 
 def _read(request: Request, collection: str, span: Span = (None, None), box: Any = None) -> list[Answer]:
-    try:
+    with reading_history():
         return features_of(parts_of(request), collection, span, box)
-    except TooMuchError as error:
-        raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
-    except HistoryError as error:
-        raise unreadable(error) from error

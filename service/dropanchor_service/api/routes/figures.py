@@ -12,16 +12,15 @@ from dropanchor_schemas.figures import Figures
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.answers.many_tracks import NO_FIGURES, figures_of
 from dropanchor_service.api.formats.figures import figures_csv
-from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.contents import TEXT
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.parameters import COMMA, Ids, example_response, ids_of, json_response
-from dropanchor_service.api.routes.period import TagsInPeriod, history_of, limits_of, selected_tags, unreadable
+from dropanchor_service.api.routes.period import TagsInPeriod, history_of, limits_of, reading_history, selected_tags
 from dropanchor_service.api.routes.site_of_request import parts_of
 from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.events.stays import TimeInZone, times_in_zones
-from dropanchor_service.history.errors import HistoryError, TooMuchError
 from dropanchor_service.history.overview import Overview
 from dropanchor_service.history.summaries import GAP_NS
 
@@ -91,12 +90,8 @@ def _figures(answers: Answers, events: EventParts, query: FiguresQuery) -> dict[
     """Return the `Figures`. Raises ProblemError."""
     from_ns, to_ns = limits_of(query, answers.now_ns())
     tracks = history_of(answers)
-    try:
+    with reading_history():
         overview = tracks.overview(selected_tags(answers, tracks, query), from_ns, to_ns, 2)
-    except TooMuchError as error:
-        raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
-    except HistoryError as error:
-        raise unreadable(error) from error
     with reading():
         times = times_in_zones(events.store.database, from_ns, to_ns, _last_known_ns(overview))
     each = {overview.names[int(row["tag"])]: figures_of(row) for row in overview.figures}

@@ -8,12 +8,11 @@ from pydantic import Field
 from starlette.responses import Response
 
 from dropanchor_schemas.heat_map import HeatMap
-from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.parameters import example_response, json_response
-from dropanchor_service.api.routes.period import TagsInPeriod, history_of, limits_of, selected_tags, unreadable
+from dropanchor_service.api.routes.period import TagsInPeriod, history_of, limits_of, reading_history, selected_tags
 from dropanchor_service.api.routes.site_of_request import answers_of
-from dropanchor_service.history.errors import HistoryError, TooMuchError
 from dropanchor_service.history.heat_cells import LARGEST_M, SMALLEST_M
 from dropanchor_service.history.heat_map import MAX_SQUARES
 from dropanchor_service.history.tracks import Tracks
@@ -59,13 +58,9 @@ def get_heat_map(query: Annotated[HeatMapQuery, Query()], request: Request) -> R
     answers = answers_of(request)
     from_ns, to_ns = limits_of(query, answers.now_ns())
     tracks = history_of(answers)
-    try:
+    with reading_history():
         tags = selected_tags(answers, tracks, query)
         return json_response(_heat_map(tracks, tags, from_ns, to_ns, query.cell_m))
-    except TooMuchError as error:
-        raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
-    except HistoryError as error:
-        raise unreadable(error) from error
 
 
 def _heat_map(tracks: Tracks, tags: list[str] | None, from_ns: int, to_ns: int, cell_m: float) -> dict[str, Any]:

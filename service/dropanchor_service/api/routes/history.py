@@ -7,9 +7,8 @@ from dropanchor_schemas.tracks import History
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
-from dropanchor_service.api.routes.period import unreadable
+from dropanchor_service.api.routes.period import reading_history
 from dropanchor_service.api.routes.site_of_request import answers_of
-from dropanchor_service.history.errors import HistoryError
 
 _EXAMPLE = {"enabled": True, "from_ns": 1_797_408_000_000_000_000, "to_ns": 1_800_000_000_000_000_000}
 
@@ -27,9 +26,7 @@ def get_history(request: Request) -> Response:
     answers = answers_of(request)
     if answers.tracks is None:
         return json_response({"enabled": False, "from_ns": None, "to_ns": None})
-    try:
+    with reading_history():
         span = answers.tracks.span()
-    except HistoryError as error:
-        raise unreadable(error) from error
     from_ns, to_ns = (None, None) if span is None else span
     return json_response({"enabled": True, "from_ns": from_ns, "to_ns": to_ns})

@@ -1,5 +1,8 @@
 """What the routes of the history share: a period, and the problems of a history that is missing or unreadable."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from pydantic import BaseModel, ConfigDict, Field
 
 from dropanchor_schemas.site import Label
@@ -7,7 +10,7 @@ from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.routes.known_tag import unknown_tag
 from dropanchor_service.api.routes.parameters import TagFilter, TimeNs
-from dropanchor_service.history.errors import HistoryError
+from dropanchor_service.history.errors import HistoryError, TooMuchError
 from dropanchor_service.history.tracks import Tracks
 
 HOUR_NS = 3_600_000_000_000
@@ -94,5 +97,12 @@ def require_known(answers: Answers, tracks: Tracks, tag: str) -> None:
         raise unknown_tag(tag)
 
 
-def unreadable(error: HistoryError) -> ProblemError:
-    return ProblemError(Kind.HISTORY_UNREADABLE, f"The history cannot be read: {error}.")
+@contextmanager
+def reading_history() -> Iterator[None]:
+    """Turn a history that cannot be read, and a request for too much of it, into a problem."""
+    try:
+        yield
+    except TooMuchError as error:
+        raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
+    except HistoryError as error:
+        raise ProblemError(Kind.HISTORY_UNREADABLE, f"The history cannot be read: {error}.") from error

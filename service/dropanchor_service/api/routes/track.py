@@ -19,9 +19,8 @@ from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.contents import TEXT, schema_of
 from dropanchor_service.api.routes.parameters import TagId
-from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
+from dropanchor_service.api.routes.period import Period, history_of, limits_of, reading_history, require_known
 from dropanchor_service.api.routes.site_of_request import answers_of
-from dropanchor_service.history.errors import HistoryError
 
 MAX_POSES = 10_000
 _PARQUET_IS_A_FILE = say(
@@ -101,11 +100,9 @@ def get_track(tag: TagId, query: Annotated[TrackQuery, Query()], request: Reques
 
 def _page(answers: Answers, tag: str, from_ns: int, to_ns: int, limit: int) -> TrackPage:
     tracks = history_of(answers)
-    try:
+    with reading_history():
         require_known(answers, tracks, tag)
         return track_page(tracks, answers.site, tag, from_ns, to_ns, limit)
-    except HistoryError as error:
-        raise unreadable(error) from error
 
 
 def _link(query: dict[str, Any], form: str) -> str:

@@ -17,10 +17,9 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import TagId
-from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
+from dropanchor_service.api.routes.period import Period, history_of, limits_of, reading_history, require_known
 from dropanchor_service.api.routes.site_of_request import answers_of
 from dropanchor_service.api.routes.track import CONTENT
-from dropanchor_service.history.errors import HistoryError
 
 PAGE = 5000
 PARQUET = "parquet"
@@ -93,11 +92,9 @@ def _parquet() -> Callable[[Iterable[TrackPage], str, Site], Iterator[bytes]]:
 def _pages(answers: Answers, tag: str, from_ns: int, to_ns: int) -> Iterator[TrackPage]:
     """Read the first page, and return an iterator over all pages. Raises ProblemError before it returns."""
     tracks = history_of(answers)
-    try:
+    with reading_history():
         require_known(answers, tracks, tag)
         first = track_page(tracks, answers.site, tag, from_ns, to_ns, PAGE)
-    except HistoryError as error:
-        raise unreadable(error) from error
 
     def every() -> Iterator[TrackPage]:
         page = first

@@ -8,13 +8,12 @@ from starlette.responses import Response
 
 from dropanchor_schemas.tracks import Tracks
 from dropanchor_service.answers.many_tracks import many_tracks
-from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import TagFilter, example_response, json_response
-from dropanchor_service.api.routes.period import Period, history_of, limits_of, unreadable
+from dropanchor_service.api.routes.period import Period, history_of, limits_of, reading_history
 from dropanchor_service.api.routes.site_of_request import answers_of
-from dropanchor_service.history.errors import HistoryError, TooMuchError
 
 _DESCRIPTION = """\
 The distance, the tracked time and the speeds of each tag over a period, and a few of its stored poses: the first, the
@@ -44,10 +43,6 @@ def get_tracks(query: Annotated[TracksQuery, Query()], request: Request) -> Resp
     answers = answers_of(request)
     from_ns, to_ns = limits_of(query, answers.now_ns())
     tracks = history_of(answers)
-    try:
+    with reading_history():
         floors = answers.site.floors
         return json_response(many_tracks(tracks, floors, query.tags or None, from_ns, to_ns, query.max_points))
-    except TooMuchError as error:
-        raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
-    except HistoryError as error:
-        raise unreadable(error) from error
