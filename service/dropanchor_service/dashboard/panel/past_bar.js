@@ -92,7 +92,7 @@ export class PastBar extends EventTarget {
 
   /** Mark times on the strip below the slider. @param {import("../data/periods.js").Period[]} times */
   mark(times) {
-    this.#part("events").setAttribute("d", stripPath(times, this.replay));
+    partOf(this.bar, "events").setAttribute("d", stripPath(times, this.replay));
   }
 
   #showPeriod() {
