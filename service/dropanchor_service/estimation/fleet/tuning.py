@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dropanchor_service.estimation.fleet.belief.births.numbers import ALL
+from dropanchor_service.estimation.fleet.compiled import njit
 
 TuningRecord: TypeAlias = npt.NDArray[np.void]  # (1,), what `Tuning.record` returns
 
@@ -112,9 +113,15 @@ class Tuning(NamedTuple):
     obs_window: float = 10.0  # s
     obs_q: float = 0.003  # (m/s)^2/s, speed noise in the information about the bearing
     obs_q_no_acc: float = 0.05  # the same, without an accelerometer
-    births: int = ALL  # a bit for each birth of hypotheses that is switched on (`belief/births/table.without`)
+    births: int = ALL  # a bit for each birth of hypotheses that is switched on (`belief/births/numbers.without`)
 
     def record(self) -> TuningRecord:
         """Return the parameters as a structured array (1,): compiled code gets one pointer instead of all numbers."""
         kinds = [(name, np.int64 if kind is int else np.float64) for name, kind in type(self).__annotations__.items()]
         return np.array([tuple(self)], kinds)
+
+
+@njit(nogil=True)
+def is_on(birth: int, t: Tuning) -> bool:
+    """Return whether a birth, by its number, is switched on, so that an engine can run without it."""
+    return bool((t.births >> birth) & 1 == 1)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Final
 
-from dropanchor_service.estimation.fleet.belief.births.table import BIRTHS, without
+from dropanchor_service.estimation.fleet.belief.births.numbers import NAMES, without
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 _FLEET = "dropanchor_service.estimation.fleet"
@@ -58,7 +58,7 @@ _NOT_ALONE: Final = {"given-start", "ring", "carried-start", "pick-up", "walked-
 """Births without which a tag never starts, or starts for ever."""
 
 RULES: Final = (
-    *(Rule(f"birth: {one.name}", one.needed_by, births=(one.name,)) for one in BIRTHS if one.name not in _NOT_ALONE),
+    *(Rule(f"birth: {name}", "reference/births.md says", births=(name,)) for name in NAMES if name not in _NOT_ALONE),
     Rule(
         "birth: any in the other direction",
         "forklift/*/*/*",

@@ -14,7 +14,6 @@ from prometheus_client.registry import CollectorRegistry
 import dropanchor_service
 from dropanchor_evaluation.reference import (
     access_page,
-    births_page,
     fields_page,
     goals_page,
     metrics_page,
@@ -55,7 +54,6 @@ def pages() -> Mapping[str, str]:
             "reference/rest.md": rest_page.page(json.loads(openapi.text())),
             "reference/omlox.md": omlox_page.page(openapi.omlox_document()),
             "reference/pose-states.md": states_page.page(),
-            "reference/births.md": births_page.page(),
             "reference/fields.md": fields_page.page(),
             "reference/metrics.md": metrics_page.page(registry, _registry_of_node()),
             "reference/numbers.md": numbers_page.page(),

@@ -35,7 +35,7 @@ def may_start_with_own_error(row: Array) -> bool:
     """Whether a tag that starts where the operator said gets a second class of heading errors."""
     row["start"]["known"], node = 1, np.zeros(1, NODE)
     node["heading_kind"] = DERIVED_HEADING
-    return bool(may_have_own_error(row, node[0]))
+    return bool(may_have_own_error(row, node[0], Tuning().record()[0]))
 
 
 def test_a_bias_that_is_not_calibrated_has_the_default_spread() -> None:

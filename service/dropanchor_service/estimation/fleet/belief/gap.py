@@ -11,7 +11,6 @@ from typing import Final
 from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.belief.births.forgetting import GAP, PLACE, forget
 from dropanchor_service.estimation.fleet.belief.births.numbers import AFTER_GAP
-from dropanchor_service.estimation.fleet.belief.births.switches import is_on
 from dropanchor_service.estimation.fleet.belief.layout import (
     PHI,
     STUCK_SLOTS,
@@ -31,7 +30,7 @@ from dropanchor_service.estimation.fleet.belief.states import DEGRADED, IMU_MISS
 from dropanchor_service.estimation.fleet.belief.summary import course_of
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import MOVING, RANGE, Node
-from dropanchor_service.estimation.fleet.tuning import Tuning
+from dropanchor_service.estimation.fleet.tuning import Tuning, is_on
 
 MAX_GAP_WITH_REFERENCE: Final = 1.0  # s that a track survives where a reference gives the heading afterwards
 MAX_GAP: Final = 0.5  # s, where none does

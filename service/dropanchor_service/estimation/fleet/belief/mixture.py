@@ -20,6 +20,7 @@ from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 MERGED_MOUNTS = 0.2  # rad, by which two mounting angles differ at most that are merged
+LIGHT = 6.0  # log weight below the best at which one is not split, and its line of sight not doubted
 ALIKE = 2.0  # ratio of two variances that are alike
 
 
@@ -91,6 +92,15 @@ def keep_heaviest(work: Hypotheses, count: int, most: int) -> int:
             copy_hypothesis(work, h, kept)
             kept += 1
     return kept
+
+
+@njit(nogil=True)
+def gets_child(work: Hypotheses, h: int, count: int, top: float, depth: float) -> bool:
+    """Return whether a birth gives hypothesis h a child: there is room, and it is not too light for it.
+
+    top: log weight of the heaviest. depth: below it, at which one is too light.
+    """
+    return bool(count < MAX_HYPOTHESES and work[h].log_weight >= top - depth)
 
 
 @njit(nogil=True)

@@ -1,21 +1,15 @@
 """Run the pose belief of many rows over a batch of nodes, in one compiled call."""
 
 from dropanchor_service.estimation.fleet.belief.births.carrying import was_walked_off
+from dropanchor_service.estimation.fleet.belief.births.direction import push_back
 from dropanchor_service.estimation.fleet.belief.births.first import restart_on_ring
 from dropanchor_service.estimation.fleet.belief.births.fix import is_fixed_anew
 from dropanchor_service.estimation.fleet.belief.births.forgetting import GAP, NOISE, PLACE, TRACK, forget
-from dropanchor_service.estimation.fleet.belief.births.moments import (
-    after_prediction,
-    after_range,
-    at_class_check,
-    at_reduction,
-    at_start,
-    before_prediction,
-    before_range,
-    place_in_site,
-)
-from dropanchor_service.estimation.fleet.belief.births.rotations import tells_rotation
-from dropanchor_service.estimation.fleet.belief.births.sight import contradicts_ranges
+from dropanchor_service.estimation.fleet.belief.births.heading_classes import try_own_error_again
+from dropanchor_service.estimation.fleet.belief.births.moments import after_prediction, at_start, before_prediction
+from dropanchor_service.estimation.fleet.belief.births.rotations import place_in_site, tells_rotation
+from dropanchor_service.estimation.fleet.belief.births.sight import contradicts_ranges, follow_jumps
+from dropanchor_service.estimation.fleet.belief.births.splitting import split
 from dropanchor_service.estimation.fleet.belief.gap import (
     accumulate_gap,
     is_stuck,
@@ -118,21 +112,21 @@ def _fuse_measurement(
 ) -> int:
     """Fuse the node's range or bearing, unless only a frame of the site gives it a meaning. Return the count."""
     if row.heading.in_site_frame == 0 and tells_rotation(row, node):
-        count = place_in_site(work, count, row, node, t, scratch)
+        count = place_in_site(work, count, row, t)
         if row.heading.in_site_frame == 0:
             return count
     if node.kind == RANGE and row.anchor >= 0 and not belief.stuck:
-        count = before_range(work, count, row, node, t, scratch)
+        count = push_back(work, count, row, node, t)
         update_with_range(work, count, row, node, anchors, t, scratch, belief)
         row.since_range_s = 0.0
-        count = after_range(work, count, row, node, t, scratch)
+        count = follow_jumps(work, count, row, t, scratch)
     if node.kind == BEARING and row.anchor >= 0:
         update_with_bearing(work, count, row, node, anchors, t, scratch, belief)
     return count
 
 
 @njit(nogil=True)
-def _reduce_mixture(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> int:
+def _reduce_mixture(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> int:
     """Normalise and prune; now and then merge, split and keep both heading classes. Return the count."""
     normalise(work, count)
     count = prune(work, count, t.prune_depth)
@@ -143,11 +137,11 @@ def _reduce_mixture(work: Hypotheses, count: int, row: Row, node: Node, t: Tunin
         if count > 1:
             distance = t.merge_distance if node.rest == MOVING else t.merge_distance_at_rest
             count = merge(work, count, distance, t.merge_light)
-        count = at_reduction(work, count, row, node, t, scratch)
+        count = split(work, count, row, node, t)
         count = keep_heaviest(work, count, max_hypotheses(row, t))
     if row.since_class_check_s >= CHECK_CLASSES_EVERY and uses_heading(row, node):
         row.since_class_check_s = 0.0
-        count = at_class_check(work, count, row, node, t, scratch)
+        count = try_own_error_again(work, count, row, t)
     return count
 
 
@@ -156,13 +150,13 @@ def _run_node(
     work: Hypotheses, count: int, row: Row, node: Node, anchors: Anchors, t: Tuning, scratch: Scratch, belief: Belief
 ) -> int:
     """Take a node into a row that has hypotheses. Return their count, 0 where the numbers are not finite."""
-    count = before_prediction(work, count, row, node, t, scratch)
+    count = before_prediction(work, count, row, node, t)
     _predict_all(work, count, row, node, t, scratch)
     _fuse_motion(work, count, row, node, t, scratch)
-    count = after_prediction(work, count, row, node, t, scratch)
+    count = after_prediction(work, count, row, node, t)
     belief.stuck = is_stuck(row, node, work[best_of(work, count)].mean[V])
     count = _fuse_measurement(work, count, row, node, anchors, t, scratch, belief)
-    return _reduce_mixture(work, count, row, node, t, scratch) if all_finite(work, count) else 0
+    return _reduce_mixture(work, count, row, node, t) if all_finite(work, count) else 0
 
 
 @njit(nogil=True)
@@ -196,13 +190,13 @@ def _follow(
 
 
 @njit(nogil=True)
-def _start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: Tuning, scratch: Scratch) -> int:
+def _start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: Tuning) -> int:
     """Take a node into a row without hypotheses, and make the first ones where it has enough. Return their count."""
     if is_suspended(row, node):
         return 0
     if row.gap.unobserved_s > 0.0:
         restart_from_gap(row, anchors[row.anchor], t)
-    return at_start(work, row, node, anchors, t, scratch)
+    return at_start(work, row, node, anchors, t)
 
 
 @njit(nogil=True)
@@ -230,7 +224,7 @@ def _advance_row(
         count = 0
     if count > 0:
         return _follow(work, count, row, pool, node, anchors, t, scratch, belief)
-    return _start(work, row, node, anchors, t, scratch)
+    return _start(work, row, node, anchors, t)
 
 
 @njit(nogil=True, cache=True)

@@ -1,11 +1,15 @@
 """The births of hypotheses: the table is whole, and each birth can be switched off."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import dropanchor_service
 from dropanchor_service.estimation.fleet.belief.births import numbers
 from dropanchor_service.estimation.fleet.belief.births.forgetting import MISFIT, PLACE, SIGHT, TRACK, forget
-from dropanchor_service.estimation.fleet.belief.births.table import BIRTHS, NoBirthError, without
+from dropanchor_service.estimation.fleet.belief.births.numbers import NAMES, NoBirthError, without
 from dropanchor_service.estimation.fleet.belief.layout import ROW
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.fleet.tuning import Tuning
@@ -17,9 +21,11 @@ NEEDED = [
 ]
 
 
-def test_every_birth_has_one_row_in_the_order_of_its_number() -> None:
-    assert [birth.number for birth in BIRTHS] == list(range(numbers.BIRTHS))
-    assert len({birth.name for birth in BIRTHS}) == numbers.BIRTHS
+def test_every_birth_has_a_number_and_a_row_in_the_table_of_the_documentation() -> None:
+    table = Path(dropanchor_service.__file__).parents[1] / "docs/reference/births.md"
+    assert re.findall(r"^\| `([a-z-]+)` \|", table.read_text(), re.MULTILINE) == list(NAMES)
+    assert NAMES[numbers.FIX] == "fix"
+    assert len(set(NAMES)) == numbers.FIX + 1
 
 
 def test_births_are_on_unless_somebody_switches_them_off_by_name() -> None:

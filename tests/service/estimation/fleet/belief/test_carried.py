@@ -13,9 +13,9 @@ from dropanchor_evaluation.product.work import Result, run_row, run_tags
 from dropanchor_service.estimation.columns import Motion
 from dropanchor_service.estimation.fleet.belief.births.carrying import (
     ANY_DIRECTION_VAR,
-    copy_turned_device,
     follow_motion,
     start_carried,
+    turn_device,
     was_walked_off,
 )
 from dropanchor_service.estimation.fleet.belief.layout import (
@@ -182,8 +182,9 @@ def test_bumps_of_a_fast_vehicle_are_no_steps() -> None:
 
 
 def test_after_a_quick_turn_the_device_may_have_turned_and_not_its_carrier() -> None:
-    _, work, _ = row_of_a_walk(0.0)
-    copy_turned_device(work, 0, 1, 1.5, T.record()[0])
+    _, work, node = row_of_a_walk(0.0)
+    node["turned"] = 1.5
+    assert turn_device(work, 1, node, T.record()[0]) == 2
     course = work["mean"][:2, YAW] + work["mean"][:2, MOUNT]
     assert course[0] - course[1] == pytest.approx(1.5)
 

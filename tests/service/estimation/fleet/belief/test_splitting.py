@@ -26,7 +26,7 @@ def travelling(angle: float, speed: float, speed_std: float, angle_std: float = 
 
 def is_split(work: Any) -> bool:
     row = np.zeros(1, ROW)[0]
-    return bool(is_wide(work[0], row, TUNING) or is_curved(work[0], row, TUNING))
+    return bool(is_wide(work[0], row, TUNING) or is_curved(work[0], TUNING))
 
 
 def test_a_slow_tag_of_uncertain_speed_is_split_where_it_travels_across_the_line_of_sight() -> None:

@@ -8,8 +8,13 @@ from typing import Final
 
 from dropanchor_service.estimation.fleet.angles import TWO_PI, wrap
 from dropanchor_service.estimation.fleet.belief.births.forgetting import SIGHT, forget
-from dropanchor_service.estimation.fleet.belief.births.numbers import CARRIED_START, PICK_UP, SET_DOWN, WALKED_OFF
-from dropanchor_service.estimation.fleet.belief.births.switches import is_on
+from dropanchor_service.estimation.fleet.belief.births.numbers import (
+    CARRIED_START,
+    DEVICE_TURN,
+    PICK_UP,
+    SET_DOWN,
+    WALKED_OFF,
+)
 from dropanchor_service.estimation.fleet.belief.carried import RING_MOUNT_STD
 from dropanchor_service.estimation.fleet.belief.heading_reference import is_of_another_axis, restart_reference
 from dropanchor_service.estimation.fleet.belief.layout import (
@@ -31,11 +36,11 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Row,
     V,
 )
-from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis
+from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis, gets_child
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import MEASURED_HEADING, Node
 from dropanchor_service.estimation.fleet.measurement.scalar import gaussian
-from dropanchor_service.estimation.fleet.tuning import Tuning
+from dropanchor_service.estimation.fleet.tuning import Tuning, is_on
 
 USUAL_SPEED: Final = 1.2  # m/s, of a walk
 BRANCH_DEPTH: Final = 4.0  # log weight below the best at which a hypothesis gets no child
@@ -213,11 +218,19 @@ def _set_down(work: Hypotheses, count: int, row: Row, t: Tuning) -> None:
 
 
 @njit(nogil=True)
-def copy_turned_device(work: Hypotheses, source: int, target: int, turned: float, t: Tuning) -> None:
-    """Copy `source` for a device that turned by that angle, rad, and not its carrier."""
-    copy_hypothesis(work, source, target)
-    child = work[target]
-    child.mean[MOUNT] = wrap(child.mean[MOUNT] - turned)
-    child.cov[R, R] += t.device_turn_var
-    child.cov[PHI, PHI] += t.device_turn_var / max(child.mean[R], 1.0) ** 2
-    child.cov[MOUNT, MOUNT] += (t.device_turn_share * turned) ** 2
+def turn_device(work: Hypotheses, count: int, node: Node, t: Tuning) -> int:
+    """Copy hypotheses after a quick turn, for a device that turned and not its carrier. Return the count."""
+    if node.carried == 0 or node.turned == 0.0 or not is_on(DEVICE_TURN, t):
+        return count
+    top = work[best_of(work, count)].log_weight
+    for h in range(count):
+        if gets_child(work, h, count, top, BRANCH_DEPTH):
+            copy_hypothesis(work, h, count)
+            child = work[count]
+            child.mean[MOUNT] = wrap(child.mean[MOUNT] - node.turned)
+            child.cov[R, R] += t.device_turn_var
+            child.cov[PHI, PHI] += t.device_turn_var / max(child.mean[R], 1.0) ** 2
+            child.cov[MOUNT, MOUNT] += (t.device_turn_share * node.turned) ** 2
+            child.log_weight += t.device_turn_log_prior
+            count += 1
+    return count

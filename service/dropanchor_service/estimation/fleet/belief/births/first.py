@@ -10,7 +10,6 @@ from dropanchor_service.estimation.fleet.belief.births.direction import can_turn
 from dropanchor_service.estimation.fleet.belief.births.fix import start_at_fix
 from dropanchor_service.estimation.fleet.belief.births.forgetting import MODE, PLACE, SIGHT, forget
 from dropanchor_service.estimation.fleet.belief.births.numbers import FIX, GIVEN_START, RING
-from dropanchor_service.estimation.fleet.belief.births.switches import is_on
 from dropanchor_service.estimation.fleet.belief.heading_models import reference_error, reset_models
 from dropanchor_service.estimation.fleet.belief.heading_reference import add_common_rotation, add_reference_error
 from dropanchor_service.estimation.fleet.belief.layout import (
@@ -58,7 +57,7 @@ from dropanchor_service.estimation.fleet.frontend.node import (
     Node,
 )
 from dropanchor_service.estimation.fleet.frontend.preintegration import unobserved_turn_var
-from dropanchor_service.estimation.fleet.tuning import Tuning
+from dropanchor_service.estimation.fleet.tuning import Tuning, is_on
 
 MIN_RANGES: Final = 5  # ranges that an unknown start needs at least
 COLLECT_S: Final = 1.0  # s over which it collects them, unless it stands or START_RANGES come sooner

@@ -3,11 +3,10 @@
 import math
 
 from dropanchor_service.estimation.fleet.belief.births.numbers import MIRRORED_START
-from dropanchor_service.estimation.fleet.belief.births.switches import is_on
 from dropanchor_service.estimation.fleet.belief.layout import MAX_HYPOTHESES, PHI, Hypotheses, R, Row
 from dropanchor_service.estimation.fleet.belief.mixture import copy_hypothesis, keep_heaviest, normalise
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.tuning import Tuning
+from dropanchor_service.estimation.fleet.tuning import Tuning, is_on
 
 
 @njit(nogil=True)

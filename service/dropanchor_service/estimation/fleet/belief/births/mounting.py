@@ -3,41 +3,21 @@
 import math
 
 from dropanchor_service.estimation.fleet.angles import wrap
-from dropanchor_service.estimation.fleet.belief.births.numbers import ALIGNED
-from dropanchor_service.estimation.fleet.belief.layout import MOUNT, Hypotheses, Hypothesis, Row
+from dropanchor_service.estimation.fleet.belief.births.numbers import ALIGNED, MOUNT_CELLS
+from dropanchor_service.estimation.fleet.belief.layout import MAX_HYPOTHESES, MOUNT, Hypotheses, Hypothesis, Row
 from dropanchor_service.estimation.fleet.belief.mixture import copy_hypothesis
 from dropanchor_service.estimation.fleet.belief.rigidity import is_mount_untold
 from dropanchor_service.estimation.fleet.belief.start import is_in_site_frame, is_yaw_known, starts_at_place
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import Node
-from dropanchor_service.estimation.fleet.tuning import Tuning
-
-
-@njit(nogil=True)
-def is_due(kind: int, row: Row, node: Node, t: Tuning) -> bool:
-    """Return whether the mounting angle of a new tag needs other guesses."""
-    return may_be_aligned(row, node, t) if kind == ALIGNED else may_be_mounted_anyhow(row, node, t)
-
-
-@njit(nogil=True)
-def admits(kind: int, one: Hypothesis) -> bool:
-    """Return whether a hypothesis gets them: cells are of a wide guess."""
-    return bool(kind == ALIGNED or one.aligned == 0)
-
-
-@njit(nogil=True)
-def make(kind: int, work: Hypotheses, source: int, target: int, row: Row, t: Tuning) -> None:
-    """Copy `source` to other guesses."""
-    if kind == ALIGNED:
-        copy_aligned(work, source, target, t)
-    else:
-        add_mounts(work, source, target, row, t)
+from dropanchor_service.estimation.fleet.tuning import Tuning, is_on
 
 
 @njit(nogil=True)
 def may_be_aligned(row: Row, node: Node, t: Tuning) -> bool:
     """Return whether the body axis of a new tag may point along its course, as it mostly does."""
-    return starts_at_place(row) and not is_in_site_frame(node.heading_kind) and is_mount_untold(row, t)
+    untold = starts_at_place(row) and not is_in_site_frame(node.heading_kind) and is_mount_untold(row, t)
+    return untold and is_on(ALIGNED, t)
 
 
 @njit(nogil=True)
@@ -46,6 +26,7 @@ def copy_aligned(work: Hypotheses, source: int, target: int, t: Tuning) -> None:
     copy_hypothesis(work, source, target)
     work[target].cov[MOUNT, MOUNT] = t.aligned_std**2
     work[target].aligned = 1
+    work[target].log_weight += t.aligned_log_prior
 
 
 @njit(nogil=True)
@@ -54,29 +35,28 @@ def may_be_mounted_anyhow(row: Row, node: Node, t: Tuning) -> bool:
 
     A wide guess is split only where it is heavy, so it never holds the few tags that are mounted quite differently.
     """
-    return bool(starts_at_place(row) and is_yaw_known(row, node) and row.settings.mount_angle_std > t.mount_cell)
+    wide = starts_at_place(row) and is_yaw_known(row, node) and row.settings.mount_angle_std > t.mount_cell
+    return bool(wide and is_on(MOUNT_CELLS, t))
 
 
 @njit(nogil=True)
-def other_cells(t: Tuning) -> int:
-    """Return the number of cells of the mounting angle without the middle one."""
-    return 2 * int(t.mount_cells)
-
-
-@njit(nogil=True)
-def add_mounts(work: Hypotheses, source: int, target: int, row: Row, t: Tuning) -> None:
-    """Copy `source` to the cells of the mounting angle beside it, and make it that of the middle one."""
+def add_mounts(work: Hypotheses, count: int, row: Row, t: Tuning) -> int:
+    """Copy each wide guess to the cells beside it, and make it that of the middle one. Return the count."""
     std, cells = row.settings.mount_angle_std, t.mount_cells
     total = 0.0
     for k in range(-cells, cells + 1):
         total += math.exp(-0.5 * (k * t.mount_cell / std) ** 2)
-    work[source].cov[MOUNT, MOUNT] = (t.mount_cell / 2.0) ** 2
-    for k in range(-cells, cells + 1):
-        if k != 0:
-            copy_hypothesis(work, source, target)
-            _turn_mount(work[target], k, std, total, t)
-            target += 1
-    _turn_mount(work[source], 0, std, total, t)
+    for h in range(count):
+        if work[h].aligned == 1 or count + 2 * cells > MAX_HYPOTHESES:
+            continue
+        work[h].cov[MOUNT, MOUNT] = (t.mount_cell / 2.0) ** 2
+        for k in range(-cells, cells + 1):
+            if k != 0:
+                copy_hypothesis(work, h, count)
+                _turn_mount(work[count], k, std, total, t)
+                count += 1
+        _turn_mount(work[h], 0, std, total, t)
+    return count
 
 
 @njit(nogil=True)

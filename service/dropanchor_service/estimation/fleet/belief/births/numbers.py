@@ -1,43 +1,33 @@
-"""The number of every birth. Births that one loop runs have consecutive numbers, in the order in which they run.
-
-Compiled code compares these integers. `table` says what each birth is; `Tuning.births` has a bit for each.
-"""
+"""The births of hypotheses by number and name. What each is, and what for, says `service/docs/reference/births.md`."""
 
 from typing import Final
 
-GIVEN_START: Final = 0
-RING: Final = 1
-ALIGNED: Final = 2
-OWN_ERROR: Final = 3
-MOUNT_CELLS: Final = 4
-CARRIED_START: Final = 5
-PICK_UP: Final = 6
-SET_DOWN: Final = 7
-SLOW_AHEAD: Final = 8
-TURN_AFTER_STOP: Final = 9
-DEVICE_TURN: Final = 10
-WIDENED: Final = 11
-SIGHT_EXPECTED: Final = 12
-ROTATIONS: Final = 13
-PUSHED_BACK: Final = 14
-SIGHT_LOST: Final = 15
-SIGHT_BACK: Final = 16
-SIGHT_CLOSED: Final = 17
-SPLIT_CURVED: Final = 18
-SPLIT_WIDE: Final = 19
-OWN_ERROR_AGAIN: Final = 20
-RING_AGAIN: Final = 21
-WALKED_OFF: Final = 22
-AFTER_GAP: Final = 23
-MIRRORED_START: Final = 24
-FIX: Final = 25
-BIRTHS: Final = 26
+GIVEN_START, RING, ALIGNED, OWN_ERROR, MOUNT_CELLS, CARRIED_START, PICK_UP, SET_DOWN = range(8)
+SLOW_AHEAD, TURN_AFTER_STOP, DEVICE_TURN, WIDENED = range(8, 12)
+SIGHT_EXPECTED, ROTATIONS, PUSHED_BACK = range(12, 15)
+SIGHT_LOST, SIGHT_BACK, SIGHT_CLOSED, SPLIT_CURVED = range(15, 19)
+SPLIT_WIDE, OWN_ERROR_AGAIN, RING_AGAIN = range(19, 22)
+WALKED_OFF, AFTER_GAP, MIRRORED_START, FIX = range(22, 26)
+NAMES: Final = (
+    *("given-start", "ring", "aligned-body", "own-error", "mount-cells", "carried-start", "pick-up", "set-down"),
+    *("ahead-while-slow", "turned-after-stop", "turned-device", "widened"),
+    *("sight-expected", "rotations", "pushed-back"),
+    *("sight-lost", "sight-back", "sight-closed", "split-curved"),
+    *("split-wide", "own-error-again", "ring-again"),
+    *("walked-off", "after-gap", "mirrored-start", "fix"),
+)  # by number
+ALL: Final = (1 << len(NAMES)) - 1  # all of them on
 
-ALL: Final = (1 << BIRTHS) - 1  # all of them on
 
-# Families, each with a file of its own. What is in none replaces all hypotheses, or widens them.
-OF_MOUNTING: Final = (ALIGNED, MOUNT_CELLS)
-OF_HEADING: Final = (OWN_ERROR, OWN_ERROR_AGAIN)
-OF_DIRECTION: Final = (SLOW_AHEAD, TURN_AFTER_STOP, PUSHED_BACK)
-OF_SIGHT: Final = (SIGHT_EXPECTED, SIGHT_LOST, SIGHT_BACK, SIGHT_CLOSED)
-OF_SPLITTING: Final = (SPLIT_CURVED, SPLIT_WIDE)
+class NoBirthError(ValueError):
+    """No birth has this name."""
+
+
+def without(*names: str) -> int:
+    """Return `Tuning.births` with these births switched off. Raises NoBirthError."""
+    switched_on = ALL
+    for name in names:
+        if name not in NAMES:
+            raise NoBirthError(f"no birth is named {name!r}; take one of {', '.join(NAMES)}")
+        switched_on &= ~(1 << NAMES.index(name))
+    return switched_on

@@ -8,14 +8,15 @@ is that of a line of sight again.
 import math
 from typing import Final
 
+from dropanchor_service.estimation.fleet.belief.births.forgetting import RUNS, forget
 from dropanchor_service.estimation.fleet.belief.births.numbers import (
     RING_AGAIN,
+    SIGHT_BACK,
     SIGHT_CLOSED,
     SIGHT_EXPECTED,
     SIGHT_LOST,
     WIDENED,
 )
-from dropanchor_service.estimation.fleet.belief.births.switches import is_on
 from dropanchor_service.estimation.fleet.belief.layout import (
     PHI,
     RANGE_BIAS,
@@ -28,11 +29,11 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Scratch,
     V,
 )
-from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis
+from dropanchor_service.estimation.fleet.belief.mixture import LIGHT, best_of, copy_hypothesis, gets_child
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import Node
 from dropanchor_service.estimation.fleet.measurement.scalar import update_component
-from dropanchor_service.estimation.fleet.tuning import Tuning
+from dropanchor_service.estimation.fleet.tuning import Tuning, is_on
 
 OFFER_EVERY: Final = 1.0  # s between offers of a line of sight
 MISFIT_LIMIT: Final = 0.5  # mean outlier probability above which most ranges are outliers
@@ -43,44 +44,23 @@ WIDEN_POSITION, WIDEN_SPEED = 1.0, 0.5  # m^2 and (m/s)^2 by which a track with 
 
 
 @njit(nogil=True)
-def is_due(kind: int, row: Row, node: Node, t: Tuning) -> bool:
-    """Return whether row and node ask for a change of the line of sight. One that is expected is due once a second."""
-    if kind == SIGHT_EXPECTED:
-        return offers_sight(row, node)
-    return kind == SIGHT_CLOSED or has_jumped(row, t)
-
-
-@njit(nogil=True)
-def admits(kind: int, one: Hypothesis, row: Row, t: Tuning) -> bool:
-    """Return whether the line of sight of a hypothesis changes."""
-    if kind == SIGHT_CLOSED:
-        return has_sight_again(one, t)
-    if kind == SIGHT_LOST:
-        return one.nlos == 1 or are_too_long(row, t)
-    return one.nlos == 1 and (kind == SIGHT_EXPECTED or not are_too_long(row, t))
-
-
-@njit(nogil=True)
-def make(kind: int, work: Hypotheses, source: int, target: int, t: Tuning, scratch: Scratch) -> None:
-    """Copy `source` to `target` for another line of sight, or give it its own again."""
-    if kind == SIGHT_LOST:
-        copy_nlos(work, source, target, t)
-    elif kind == SIGHT_CLOSED:
-        close_sight(work[source], scratch.PH)
-    else:
-        copy_los(work, source, target)
-
-
-@njit(nogil=True)
-def are_too_long(row: Row, t: Tuning) -> bool:
-    """Return whether several ranges in a row were too long: the line of sight is lost, or the path grew longer."""
-    return bool(row.nlos.high_run >= t.nlos_run)
-
-
-@njit(nogil=True)
-def has_jumped(row: Row, t: Tuning) -> bool:
-    """Return whether several ranges in a row were too long or too short: a path grew longer or shorter."""
-    return bool(row.nlos.high_run >= t.nlos_run or row.nlos.low_run >= t.nlos_run)
+def follow_jumps(work: Hypotheses, count: int, row: Row, t: Tuning, scratch: Scratch) -> int:
+    """Lose and find lines of sight where several ranges in a row were too long or too short. Return the count."""
+    longer = row.nlos.high_run >= t.nlos_run
+    if longer or row.nlos.low_run >= t.nlos_run:
+        top = work[best_of(work, count)].log_weight
+        for h in range(count):
+            if (longer or work[h].nlos == 1) and is_on(SIGHT_LOST, t) and gets_child(work, h, count, top, LIGHT):
+                copy_nlos(work, h, count, t)
+                count += 1
+            if work[h].nlos == 1 and not longer and is_on(SIGHT_BACK, t) and gets_child(work, h, count, top, LIGHT):
+                copy_los(work, h, count, t)
+                count += 1
+        forget(row, RUNS)
+    for h in range(count):
+        if is_on(SIGHT_CLOSED, t) and has_sight_again(work[h], t):
+            close_sight(work[h], scratch.PH)
+    return count
 
 
 @njit(nogil=True)
@@ -94,10 +74,11 @@ def copy_nlos(work: Hypotheses, source: int, target: int, t: Tuning) -> None:
     _decorrelate_bias(new.cov)
     new.mean[RANGE_BIAS] = new.los_bias + t.outlier_mean
     new.cov[RANGE_BIAS, RANGE_BIAS] = new.los_bias_var + t.outlier_std**2
+    new.log_weight += t.nlos_log_prior
 
 
 @njit(nogil=True)
-def copy_los(work: Hypotheses, source: int, target: int) -> None:
+def copy_los(work: Hypotheses, source: int, target: int, t: Tuning) -> None:
     """Copy `source` for a line of sight that is back, with the range bias from before it was lost."""
     copy_hypothesis(work, source, target)
     new = work[target]
@@ -105,6 +86,7 @@ def copy_los(work: Hypotheses, source: int, target: int) -> None:
     _decorrelate_bias(new.cov)
     new.mean[RANGE_BIAS] = new.los_bias
     new.cov[RANGE_BIAS, RANGE_BIAS] = new.los_bias_var
+    new.log_weight += t.nlos_log_prior
 
 
 @njit(nogil=True)
@@ -114,21 +96,20 @@ def _decorrelate_bias(P: Floats) -> None:
 
 
 @njit(nogil=True)
-def offers_sight(row: Row, node: Node) -> bool:
-    """Return whether lost lines of sight may be back now, though no jump shows it."""
+def expect_sight(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> int:
+    """Offer a line of sight now and then, though no jump shows it. Lost ones come back at the rate 1/nlos_tau."""
     row.nlos.since_los_offer_s += node.dt_s
-    offer = row.nlos.since_los_offer_s >= OFFER_EVERY
-    if offer:
+    if row.nlos.since_los_offer_s >= OFFER_EVERY:
         row.nlos.since_los_offer_s = 0.0
-    return bool(offer)
-
-
-@njit(nogil=True)
-def doubt_nlos(work: Hypotheses, count: int, node: Node, t: Tuning) -> None:
-    """Let lost lines of sight come back at the rate 1/nlos_tau."""
+        top = work[best_of(work, count)].log_weight
+        for h in range(count):
+            if work[h].nlos == 1 and is_on(SIGHT_EXPECTED, t) and gets_child(work, h, count, top, LIGHT):
+                copy_los(work, h, count, t)
+                count += 1
     for h in range(count):
         if work[h].nlos == 1:
             work[h].log_weight -= node.dt_s / t.nlos_tau
+    return count
 
 
 @njit(nogil=True)

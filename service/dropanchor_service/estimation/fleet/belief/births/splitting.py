@@ -2,10 +2,21 @@
 
 import math
 
-from dropanchor_service.estimation.fleet.belief.births.numbers import SPLIT_WIDE
-from dropanchor_service.estimation.fleet.belief.births.switches import is_on
-from dropanchor_service.estimation.fleet.belief.layout import MOUNT, PHI, SLIP, YAW, Hypotheses, Hypothesis, N, Row, V
+from dropanchor_service.estimation.fleet.belief.births.numbers import SPLIT_CURVED, SPLIT_WIDE
+from dropanchor_service.estimation.fleet.belief.layout import (
+    MOUNT,
+    PHI,
+    SLIP,
+    WORKING_HYPOTHESES,
+    YAW,
+    Hypotheses,
+    Hypothesis,
+    N,
+    Row,
+    V,
+)
 from dropanchor_service.estimation.fleet.belief.mixture import (
+    LIGHT,
     angle_variance,
     best_of,
     copy_hypothesis,
@@ -13,7 +24,7 @@ from dropanchor_service.estimation.fleet.belief.mixture import (
 )
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import MOVING, Node
-from dropanchor_service.estimation.fleet.tuning import Tuning
+from dropanchor_service.estimation.fleet.tuning import Tuning, is_on
 
 SPLIT_CENTRE, SPLIT_SIDE = 0.5496, 0.2252  # weights of the three parts
 SPLIT_SHIFT = 1.0576  # standard deviations
@@ -23,16 +34,20 @@ LEAST_RATE = 0.01  # m/s, error of a range rate below which nothing is split
 
 
 @njit(nogil=True)
-def is_due(kind: int, work: Hypotheses, count: int, row: Row, node: Node) -> bool:
-    """Return whether hypotheses may need a split: only a motion makes a wide angle non-linear."""
-    moved = node.rest == MOVING and row.start.way >= LEAST_WAY
-    return bool(moved and (kind == SPLIT_WIDE or may_split_curved(work, count, row)))
-
-
-@njit(nogil=True)
-def admits(kind: int, one: Hypothesis, row: Row, t: Tuning) -> bool:
-    """Return whether a hypothesis is split."""
-    return is_wide(one, row, t) if kind == SPLIT_WIDE else is_curved(one, row, t)
+def split(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> int:
+    """Split what a motion makes non-linear: a wide angle, or a curved range rate. Return the count of hypotheses."""
+    if node.rest != MOVING or row.start.way < LEAST_WAY:
+        return count
+    curved = is_on(SPLIT_CURVED, t) and may_split_curved(work, count, row)
+    floor = work[best_of(work, count)].log_weight - LIGHT
+    for h in range(count):
+        one = work[h]
+        if one.log_weight >= floor and count + 2 <= WORKING_HYPOTHESES:
+            wide = is_on(SPLIT_WIDE, t) and is_wide(one, row, t)
+            if wide or (curved and is_curved(one, t)):
+                add_parts(work, h, count)
+                count += 2
+    return count
 
 
 @njit(nogil=True)
@@ -90,10 +105,8 @@ def is_wide(one: Hypothesis, row: Row, t: Tuning) -> bool:
 
 
 @njit(nogil=True)
-def is_curved(one: Hypothesis, row: Row, t: Tuning) -> bool:
-    """Return whether the range rate of a hypothesis is not linear, and its angle is not split for its width."""
-    if is_on(SPLIT_WIDE, t) and is_wide(one, row, t):
-        return False
+def is_curved(one: Hypothesis, t: Tuning) -> bool:
+    """Return whether the range rate of a hypothesis is not linear."""
     return curvature(one, angle_variance(one.cov)) > t.split_curvature
 
 
