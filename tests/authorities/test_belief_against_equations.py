@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dropanchor_service.estimation.fleet.belief.heading_update import update_heading
 from dropanchor_service.estimation.fleet.belief.layout import (
     ACC_BIAS,
     GYRO_BIAS,
@@ -21,7 +22,6 @@ from dropanchor_service.estimation.fleet.belief.layout import (
 )
 from dropanchor_service.estimation.fleet.belief.predict import predict_covariance, predict_state
 from dropanchor_service.estimation.fleet.measurement.bearing import update_bearing
-from dropanchor_service.estimation.fleet.measurement.heading import update_heading
 from dropanchor_service.estimation.fleet.measurement.range import predict_range, update_range
 from dropanchor_service.estimation.fleet.measurement.scalar import project
 from dropanchor_service.estimation.fleet.measurement.speed import truncate_speed

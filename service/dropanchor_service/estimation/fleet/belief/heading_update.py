@@ -24,8 +24,11 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     MAGNETOMETER_MODEL,
     PHI,
     PLATFORM_MODEL,
+    REFERENCE,
     YAW,
     Hypotheses,
+    Hypothesis,
+    N,
     Row,
     Scratch,
 )
@@ -33,8 +36,19 @@ from dropanchor_service.estimation.fleet.belief.mixture import best_of
 from dropanchor_service.estimation.fleet.belief.start import ADOPT_VAR, choose_model
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, MEASURED_HEADING, Node
-from dropanchor_service.estimation.fleet.measurement.heading import update_heading
+from dropanchor_service.estimation.fleet.measurement.scalar import update_pda
 from dropanchor_service.estimation.fleet.tuning import Tuning
+
+
+@njit(nogil=True)
+def update_heading(one: Hypothesis, scratch: Scratch, z: float, variance: float) -> None:
+    """Update one hypothesis with a heading, rad: z = yaw + error of the reference."""
+    s, P, PH = one.mean, one.cov, scratch.PH
+    for i in range(N):
+        PH[i] = P[YAW, i] + P[REFERENCE, i]
+    e = wrap(z - s[YAW] - s[REFERENCE])
+    S = PH[YAW] + PH[REFERENCE] + variance
+    update_pda(s, P, PH, S, e, 1.0)
 
 
 @njit(nogil=True)

@@ -13,11 +13,11 @@ right angles to the course in the middle of the node: only along that course doe
 import math
 from typing import Any
 
-from dropanchor_service.estimation.fleet.belief.carried import fill_carried_noise
 from dropanchor_service.estimation.fleet.belief.heading_models import class_reference_error, reference_error
 from dropanchor_service.estimation.fleet.belief.heading_reference import follow_reference
 from dropanchor_service.estimation.fleet.belief.layout import (
     ACC_BIAS,
+    GAIT_OFFSET,
     GYRO_BIAS,
     LEFT_BIAS,
     MAGNETOMETER_MODEL,
@@ -26,6 +26,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     RANGE_BIAS,
     REFERENCE,
     SLIP,
+    STEP_SCALE,
     YAW,
     Floats,
     N,
@@ -213,7 +214,23 @@ def fill_noise(decay: Floats, growth: Floats, node: Node, row: Row, t: Tuning) -
     growth[LEFT_BIAS] = (t.left_bias_std**2 + rough_var) * lost + tilted
     growth[RANGE_BIAS] = row.settings.range_bias_std**2 * -math.expm1(-2.0 * dt / t.range_bias_tau)
     if node.carried == 1:
-        fill_carried_noise(decay, growth, dt, row, t)
+        _fill_carried_noise(decay, growth, dt, row, t)
+
+
+@njit(nogil=True)
+def _fill_carried_noise(decay: Floats, growth: Floats, dt: float, row: Row, t: Tuning) -> None:
+    """Fill what differs for a carried tag: its course is yaw + mount + slip, where slip is the sway of the hand.
+
+    The mounting angle may be anything, and steps measure the speed, a random walk. Accelerations are not used, so the
+    scale and the offset of the steps stand in the state where the accelerometer's biases are otherwise.
+    """
+    growth[V] = t.q_walk_speed * dt
+    growth[MOUNT] = t.q_grip * dt
+    decay[SLIP] = math.exp(-dt / t.sway_tau)
+    std = row.settings.slip_std if row.settings.slip_given == 1 else t.sway_std
+    growth[SLIP] = std**2 * (1.0 - decay[SLIP] ** 2)
+    decay[GAIT_OFFSET] = decay[STEP_SCALE] = 1.0
+    growth[GAIT_OFFSET], growth[STEP_SCALE] = 0.0, t.q_step_scale * dt
 
 
 @njit(nogil=True)

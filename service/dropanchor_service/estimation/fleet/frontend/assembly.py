@@ -10,7 +10,7 @@ from dropanchor_service.estimation.fleet.frontend.event import HEADING_EVENT, PR
 from dropanchor_service.estimation.fleet.frontend.height import add_pressure, height_at
 from dropanchor_service.estimation.fleet.frontend.inertial import add_sample, close_node
 from dropanchor_service.estimation.fleet.frontend.lever import apply_lever
-from dropanchor_service.estimation.fleet.frontend.node import NO_HEADING, NO_MEASUREMENT, RANGE, Node, Nodes
+from dropanchor_service.estimation.fleet.frontend.node import NO_HEADING, RANGE, Node, Nodes
 from dropanchor_service.estimation.fleet.frontend.platform import (
     Platform,
     add_reading,
@@ -27,11 +27,7 @@ AUTO, IMU_ONLY, PLATFORM_ONLY = 0, 1, 2
 
 @njit(nogil=True)
 def _close(front: Frontend, platform: Platform, row: Any, t_ns: int, node: Node) -> None:
-    """End a node of the row at t_ns: from the IMU if there is one, else from the platform."""
-    node.row = -1
-    node.t_ns = t_ns
-    node.kind = NO_MEASUREMENT
-    node.lag_s = node.wander_var = 0.0
+    """End a node, which is zero, of the row at t_ns: from the IMU if there is one, else from the platform."""
     if front.running == 1:
         newest = max(t_ns, front.t_imu, front.t_node)
         carried = front.carrying.carried
@@ -86,7 +82,7 @@ def assemble_nodes(
     nodes: Nodes,
     verdicts: Array,
 ) -> int:
-    """Fill `nodes` from the samples in `order`, which index IMU and, behind it, EVENT. Return the number of nodes.
+    """Fill `nodes`, zeros, from the samples in `order`: indices of IMU and, behind it, EVENT. Return how many.
 
     verdicts: what became of each IMU sample. The anchor of a pressure receives what became of it.
     """

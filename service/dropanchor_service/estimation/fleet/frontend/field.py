@@ -68,9 +68,7 @@ def start_magnetometer(g: Magnetometer, mx: float, my: float, mz: float, hard_ir
     g.P[SCALE, SCALE] = GYRO_SCALE * GYRO_SCALE
     g.age = NOISE_PRIOR
     g.changed = 0
-    g.since_last = 0.0
-    g.elapsed = 0.0
-    g.count = 0.0
+    g.since_last = g.elapsed = g.count = 0.0
     g.sum_m[:] = 0.0
     g.sum_R[:] = 0.0
 

@@ -55,16 +55,10 @@ FIRST_STEP = 0.5  # of its length: the way of somebody who stood until its peak
 @njit(cache=True, nogil=True)
 def start_gait(g: Gait, size: float) -> None:
     """Start with the size of one acceleration, m/s^2."""
-    g.slow = size
+    g.slow, g.since_step_s = size, MAX_INTERVAL
+    g.falling, g.regular = 1, 0
     g.low[:] = 0.0
-    g.seen_s = 0.0
-    g.falling = 1
-    g.peak = g.trough = 0.0
-    g.swing = 0.0
-    g.since_peak_s = 0.0
-    g.since_step_s = MAX_INTERVAL
-    g.interval = 0.0
-    g.regular = 0
+    g.seen_s = g.peak = g.trough = g.swing = g.since_peak_s = g.interval = 0.0
     g.length_sum = g.time_sum = g.walked = 0.0
 
 

@@ -40,7 +40,6 @@ from dropanchor_service.estimation.fleet.frontend.magnetometer import north_of, 
 from dropanchor_service.estimation.fleet.frontend.node import (
     ABSOLUTE_HEADING,
     MOVING,
-    NO_HEADING,
     RELATIVE_HEADING,
     RESTING,
     Node,
@@ -209,14 +208,9 @@ def fill_heading(f: Frontend, psi: float, ahead: float, node: Node) -> None:
 @njit(cache=True, nogil=True)
 def fill_unknown(dt: float, node: Node) -> None:
     """Fill a node before the first IMU sample."""
-    node.dt_s = dt
-    node.dyaw, node.dyaw_var = 0.0, unobserved_turn_var(dt)
-    node.gyro_bias_var, node.gyro_bias_step, node.gyro_tilt_var = 0.0, 0.0, 0.0
-    node.dv_forward, node.dv_left, node.dv_var, node.tilt_gain = 0.0, 0.0, math.inf, 0.0
-    node.motion_var = 0.0
-    node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
-    node.rest = MOVING
-    node.unobserved_s = dt
+    node.dt_s = node.unobserved_s = dt
+    node.dyaw_var = unobserved_turn_var(dt)
+    node.dv_var = node.heading_var = math.inf
 
 
 @njit(cache=True, nogil=True)

@@ -60,10 +60,8 @@ def start_large_bias(one: LargeBias, new: bool) -> None:
 def begin_steady(one: LargeBias, q: Array) -> None:
     """Begin to watch a tag that is steady from now on, in the attitude q."""
     one.q[:] = q
-    one.turned[:] = 0.0
+    one.turned[:] = one.field[:] = one.turned_then[:] = 0.0
     one.fields = 0.0
-    one.field[:] = 0.0
-    one.turned_then[:] = 0.0
 
 
 @njit(nogil=True)

@@ -19,7 +19,6 @@ from dropanchor_service.estimation.fleet.frontend.node import Node
 def apply_lever(row: Any, node: Node) -> None:
     """Fill the node's swing, and turn its dv into that of the pivot."""
     x, y = row.settings.lever_x, row.settings.lever_y
-    node.swing_forward, node.swing_left = 0.0, 0.0
     if x == 0.0 and y == 0.0:
         return
     c, s = math.cos(node.dyaw), math.sin(node.dyaw)

@@ -106,8 +106,7 @@ def update_magnetometer(
         predict_field(g, g.elapsed, dyaw)
     fuse(g, g.elapsed, rest)
     g.yaw = yaw
-    g.elapsed = 0.0
-    g.count = 0.0
+    g.elapsed = g.count = 0.0
     g.sum_m[:] = 0.0
     g.sum_R[:] = 0.0
 

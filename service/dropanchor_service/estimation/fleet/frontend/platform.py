@@ -16,7 +16,6 @@ from dropanchor_service.estimation.fleet.frontend.carrying import carried_yaw
 from dropanchor_service.estimation.fleet.frontend.node import (
     DERIVED_HEADING,
     MEASURED_HEADING,
-    MOVING,
     NO_HEADING,
     NOT_MOVED,
     RESTING,
@@ -72,11 +71,7 @@ def add_reading(p: Platform, front: Frontend, t_ns: int, heading: float, std: fl
 @njit(nogil=True)
 def fill_platform_node(p: Platform, t_ns: int, node: Node) -> None:
     """Fill a node from the platform alone: no acceleration, and yaw from the increments of the heading."""
-    node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
-    node.dyaw, node.dyaw_var, node.dt_s, node.rest = 0.0, 0.0, 0.0, MOVING
-    node.gyro_bias_var, node.gyro_bias_step, node.gyro_tilt_var = 0.0, 0.0, 0.0
-    node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
-    node.unobserved_s = 0.0
+    node.dv_var = node.heading_var = math.inf
     if p.reading_count == 0:
         _wander(p, t_ns, node)
         return

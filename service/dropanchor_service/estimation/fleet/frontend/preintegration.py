@@ -141,7 +141,5 @@ def end_node(p: Preintegration, yaw: float, ahead: float, dt: float, node: Node)
     node.motion_var = ACC_ROUGH * motion_in(p) * dt
     p.yaw_end = wrap(end)
     p.V_end[0], p.V_end[1] = vx, vy
-    p.gap_s = 0.0
-    p.no_acc_s = 0.0
-    p.tilt_gain = 0.0
+    p.gap_s = p.no_acc_s = p.tilt_gain = 0.0
     return end  # type: ignore[no-any-return]

@@ -66,14 +66,9 @@ def start_standstill(s: Standstill, acc: Array, gyro: Array) -> None:
         s.mean[i] = acc[i] if math.isfinite(acc[i]) else 0.0
         s.mean[3 + i] = gyro[i]
     s.still[:] = s.mean[:3]
-    s.still_var = 0.0
     s.deviation[:] = 0.0
-    s.acc_var = 0.0
-    s.gyro_bias_var = 0.0
-    s.seen = 0.0
-    s.quiet = 0.0
-    s.block[:] = 0.0
-    s.last[:] = 0.0
+    s.block[:] = s.last[:] = 0.0
+    s.still_var = s.acc_var = s.gyro_bias_var = s.seen = s.quiet = 0.0
     s.bias_var = BIAS_SD * BIAS_SD
     s.moved = 0
 

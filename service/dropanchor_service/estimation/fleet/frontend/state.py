@@ -49,42 +49,26 @@ def start_frontend(f: Frontend, hard_iron: float, declination: float, motion: in
     declination: rad, true minus magnetic north, positive east. motion: the setting.
     """
     f.new = 1 - f.running
-    f.running = 0
-    f.carrying.motion = motion
-    f.t_node = 0
-    f.absolute = 0
-    f.hard_iron = hard_iron
-    f.declination = declination
-    f.attitude.age = 0.0
+    f.running = f.t_node = f.absolute = 0
+    f.carrying.motion, f.hard_iron, f.declination = motion, hard_iron, declination
     f.attitude.tilt_cov[:] = TILT_SD * TILT_SD, 0.0, LEVEL_BIAS_SD * LEVEL_BIAS_SD
-    f.turned = 0.0
-    f.drift_var = 0.0
-    f.drift_cov = 0.0
-    f.magnetometer.unit = 0.0
+    f.attitude.age = f.turned = f.drift_var = f.drift_cov = f.magnetometer.unit = 0.0
 
 
 @njit(cache=True, nogil=True)
 def start_at(f: Frontend, t_ns: int, acc: Array, gyro: Array) -> None:
     """Level the attitude with the first sample and begin the first node there."""
     a, p, s = f.attitude, f.preintegration, f.standstill
-    a.q[0], a.q[1], a.q[2], a.q[3] = 1.0, 0.0, 0.0, 0.0
+    a.q[:] = 1.0, 0.0, 0.0, 0.0
     a.gyro[:] = gyro
     a.bias[:] = 0.0
     f.bias_end = 0.0
     a.gravity = G0
     start_standstill(s, acc, gyro)
     start_large_bias(f.large_bias, f.new == 1)
-    p.V[:] = 0.0
-    p.a[:] = 0.0
-    p.V_end[:] = 0.0
-    p.acc_var = 0.0
+    p.V[:] = p.a[:] = p.V_end[:] = 0.0
     p.shaking[:] = 0.0
-    p.yaw_rate = 0.0
-    p.yaw_end = 0.0
-    p.gap_s = 0.0
-    p.extrapolated_s = 0.0
-    p.no_acc_s = 0.0
-    p.tilt_gain = 0.0
+    p.acc_var = p.yaw_rate = p.yaw_end = p.gap_s = p.extrapolated_s = p.no_acc_s = p.tilt_gain = 0.0
     start_carrying(f.carrying, a.gravity, f.carrying.motion)
     if math.isfinite(acc[0] + acc[1] + acc[2]):
         level_attitude(a.q, acc[0], acc[1], acc[2])

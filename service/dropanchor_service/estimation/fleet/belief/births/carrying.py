@@ -15,7 +15,6 @@ from dropanchor_service.estimation.fleet.belief.births.numbers import (
     SET_DOWN,
     WALKED_OFF,
 )
-from dropanchor_service.estimation.fleet.belief.carried import RING_MOUNT_STD
 from dropanchor_service.estimation.fleet.belief.heading_reference import is_of_another_axis, restart_reference
 from dropanchor_service.estimation.fleet.belief.layout import (
     ACC_BIAS,
@@ -42,6 +41,7 @@ from dropanchor_service.estimation.fleet.frontend.node import MEASURED_HEADING, 
 from dropanchor_service.estimation.fleet.measurement.scalar import gaussian
 from dropanchor_service.estimation.fleet.tuning import Tuning, is_on
 
+RING_MOUNT_STD: Final = 1.2  # rad, of the mounting angle of somebody's device, as one Gaussian
 USUAL_SPEED: Final = 1.2  # m/s, of a walk
 BRANCH_DEPTH: Final = 4.0  # log weight below the best at which a hypothesis gets no child
 ANY_DIRECTION_VAR: Final = math.pi**2  # rad^2, so wide that one direction is hardly likelier than another
