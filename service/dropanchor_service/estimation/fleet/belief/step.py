@@ -1,6 +1,6 @@
 """Run the pose belief of many rows over a batch of nodes, in one compiled call."""
 
-from dropanchor_service.estimation.fleet.belief.births.carrying import was_walked_off
+from dropanchor_service.estimation.fleet.belief.births.carrying import moves_anew
 from dropanchor_service.estimation.fleet.belief.births.direction import push_back
 from dropanchor_service.estimation.fleet.belief.births.first import restart_on_ring
 from dropanchor_service.estimation.fleet.belief.births.fix import is_fixed_anew
@@ -216,7 +216,7 @@ def _advance_row(
         accumulate_gap(work, count, row, node)
     if count > 0 and (
         is_track_lost(row, node)
-        or was_walked_off(row, node, t)
+        or moves_anew(row, node, t)
         or is_fixed_anew(work[best_of(work, count)], row, node, anchors)
     ):
         release(row, pool, scratch.lane)
