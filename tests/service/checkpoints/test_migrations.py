@@ -15,7 +15,7 @@ from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, Unr
 from dropanchor_service.checkpoints.migrations import STEPS, migrated
 from dropanchor_service.checkpoints.thread import CheckpointThread
 from dropanchor_service.estimation.columns import Array, State, default_settings
-from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
+from dropanchor_service.estimation.fleet.measurement.rest import QUIET_START
 from support.golden_checkpoint import Drive, golden, halves
 
 EARLIER = f"{layouts.VERSION - 1}-{'0' * 16}"

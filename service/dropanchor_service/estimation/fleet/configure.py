@@ -8,8 +8,8 @@ import numpy as np
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.belief.heading_models import REFERENCE_STD
 from dropanchor_service.estimation.fleet.belief.layout import ROW, SETTINGS
-from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from dropanchor_service.estimation.fleet.frontend.inertial import BIAS_LEFT
+from dropanchor_service.estimation.fleet.measurement.rest import QUIET_START
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 RANGE_STD = 0.15  # m

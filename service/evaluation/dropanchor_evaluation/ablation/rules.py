@@ -101,7 +101,7 @@ RULES: Final = (
         "OU/*/*/*",
         constants={"frontend.preintegration:ONE_WAY": 2.0, "measurement.lateral:ONE_WAY": 2.0},
     ),
-    Rule("a rest that may be a smooth ride", "rolling/*/*/*", constants={"belief.standing:SPEEDS": 1e9}),
+    Rule("a rest that may be a smooth ride", "rolling/*/*/*", constants={"measurement.rest:SPEEDS": 1e9}),
     Rule("level rides tell the gyroscope's bias", "rolling/*/*/*", constants={"frontend.level_ride:SMOOTH": 0.0}),
     Rule("bound of the tilt's correction", "*/9-axis/*/*", constants={"frontend.attitude:BOUND": 1e3}),
     Rule("tilt teaches the gyroscope's bias", "*/9-axis/*/*", constants={"frontend.attitude:TAU_BIAS": 1e9}),

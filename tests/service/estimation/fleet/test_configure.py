@@ -5,7 +5,7 @@ import pytest
 
 from dropanchor_schemas import StartPose, TagSettings
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.estimation.fleet.belief.births.heading_classes import may_have_own_error
+from dropanchor_service.estimation.fleet.belief.births.guesses import may_have_own_error
 from dropanchor_service.estimation.fleet.belief.heading_models import (
     REFERENCE_STD,
     SOFT_IRON_FACTOR,

@@ -3,13 +3,12 @@
 import math
 from typing import Final
 
-from dropanchor_service.estimation.fleet.belief.births.mirrored import is_mirrored
 from dropanchor_service.estimation.fleet.belief.births.sight import MISFIT_LIMIT
 from dropanchor_service.estimation.fleet.belief.layout import Anchors, Belief, Floats, Hypotheses, Row, Scratch
 from dropanchor_service.estimation.fleet.belief.observability import predict_information, sigma_obs
 from dropanchor_service.estimation.fleet.belief.parts import fill_parts
-from dropanchor_service.estimation.fleet.belief.rigidity import is_askew
-from dropanchor_service.estimation.fleet.belief.sliding import slides
+from dropanchor_service.estimation.fleet.belief.rigidity import is_askew, slides
+from dropanchor_service.estimation.fleet.belief.start import is_mirrored
 from dropanchor_service.estimation.fleet.belief.states import (
     AMBIGUOUS,
     COASTING,

@@ -1,12 +1,13 @@
 """What a start counts from: the kind of heading, the model of its error, and the distance of a range."""
 
 import math
-from typing import Final
+from typing import Any, Final
 
 from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.belief.heading_models import is_north_given
 from dropanchor_service.estimation.fleet.belief.layout import MAGNETOMETER_MODEL, PLATFORM_MODEL, Anchor, Row
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.height import TOLD
 from dropanchor_service.estimation.fleet.frontend.node import (
     ABSOLUTE_HEADING,
     DERIVED_HEADING,
@@ -14,7 +15,6 @@ from dropanchor_service.estimation.fleet.frontend.node import (
     RELATIVE_HEADING,
     Node,
 )
-from dropanchor_service.estimation.fleet.measurement.height import offset_of
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 ADOPT_VAR: Final = 0.04  # rad^2, of north below which poses are in the site frame
@@ -37,6 +37,12 @@ def uses_heading(row: Row, node: Node) -> bool:
 def starts_at_place(row: Row) -> bool:
     """Return whether a row starts where the operator said, or where it was before a gap."""
     return bool(row.start.known == 1 or row.start.after_gap == 1)
+
+
+@njit(nogil=True)
+def is_mirrored(row: Row) -> bool:
+    """Return whether a row may be at either of two places since its start."""
+    return bool(row.start.known == 1 and math.isfinite(row.start.other_x))
 
 
 @njit(nogil=True)
@@ -75,3 +81,17 @@ def horizontal_distance(row: Row, anchor: Anchor, slant: float) -> float:
     """Return the horizontal distance, m, of a tag at the distance `slant`."""
     dz = offset_of(row.settings, row.settings.height - anchor.z, slant)
     return math.sqrt(max(slant**2 - dz**2, 0.01))
+
+
+@njit(nogil=True)
+def offset_of(settings: Any, dz: float, distance: float) -> float:
+    """Return the root of the mean square height, m, above an anchor at this distance: |dz| if the height is told."""
+    if settings.height_source == TOLD:
+        return dz
+    return math.sqrt(dz * dz + height_variance_at(settings, distance))
+
+
+@njit(nogil=True)
+def height_variance_at(settings: Any, distance: float) -> float:
+    """Return the variance of the height, m^2, of a tag at this distance of the anchor."""
+    return float(min(settings.height_std**2, max(distance, 0.1) ** 2 / 3.0))

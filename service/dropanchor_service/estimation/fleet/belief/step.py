@@ -1,14 +1,18 @@
 """Run the pose belief of many rows over a batch of nodes, in one compiled call."""
 
-from dropanchor_service.estimation.fleet.belief.births.carrying import moves_anew
-from dropanchor_service.estimation.fleet.belief.births.direction import push_back
+from dropanchor_service.estimation.fleet.belief.births.carrying import follow_motion, moves_anew, turn_device
+from dropanchor_service.estimation.fleet.belief.births.direction import follow_rest, push_back, turn_back
 from dropanchor_service.estimation.fleet.belief.births.first import restart_on_ring
 from dropanchor_service.estimation.fleet.belief.births.fix import is_fixed_anew
 from dropanchor_service.estimation.fleet.belief.births.forgetting import GAP, NOISE, PLACE, TRACK, forget
-from dropanchor_service.estimation.fleet.belief.births.heading_classes import try_own_error_again
-from dropanchor_service.estimation.fleet.belief.births.moments import after_prediction, at_start, before_prediction
+from dropanchor_service.estimation.fleet.belief.births.guesses import at_start, try_own_error_again
 from dropanchor_service.estimation.fleet.belief.births.rotations import place_in_site, tells_rotation
-from dropanchor_service.estimation.fleet.belief.births.sight import contradicts_ranges, follow_jumps
+from dropanchor_service.estimation.fleet.belief.births.sight import (
+    contradicts_ranges,
+    expect_sight,
+    follow_jumps,
+    widen_after_misfit,
+)
 from dropanchor_service.estimation.fleet.belief.births.splitting import split
 from dropanchor_service.estimation.fleet.belief.gap import (
     accumulate_gap,
@@ -31,6 +35,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Rows,
     Scratch,
     V,
+    Workspace,
 )
 from dropanchor_service.estimation.fleet.belief.mixture import (
     all_finite,
@@ -44,19 +49,27 @@ from dropanchor_service.estimation.fleet.belief.mixture import (
 from dropanchor_service.estimation.fleet.belief.pool import load, mirror, release, store
 from dropanchor_service.estimation.fleet.belief.predict import fill_class_noise, fill_noise, is_empty, predict
 from dropanchor_service.estimation.fleet.belief.publish import publish
-from dropanchor_service.estimation.fleet.belief.rigidity import RIGID_SLIP, follow_mount, slip_std_of, weight_power
-from dropanchor_service.estimation.fleet.belief.sliding import follow_sliding
-from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
+from dropanchor_service.estimation.fleet.belief.rigidity import (
+    RIGID_SLIP,
+    follow_mount,
+    follow_sliding,
+    slip_std_of,
+    weight_power,
+)
 from dropanchor_service.estimation.fleet.belief.start import is_in_site_frame, uses_heading
 from dropanchor_service.estimation.fleet.belief.states import FAULT
 from dropanchor_service.estimation.fleet.belief.tilt import bends_tilt
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, RESTING, Node, Nodes
 from dropanchor_service.estimation.fleet.measurement.bearing import update_with_bearing
-from dropanchor_service.estimation.fleet.measurement.height import take_height
 from dropanchor_service.estimation.fleet.measurement.lateral import update_lateral
-from dropanchor_service.estimation.fleet.measurement.range import update_with_range
-from dropanchor_service.estimation.fleet.measurement.rest import standing_log_likelihood, update_standstill
+from dropanchor_service.estimation.fleet.measurement.range import take_height, update_with_range
+from dropanchor_service.estimation.fleet.measurement.rest import (
+    QUIET_START,
+    judge_standstill,
+    standing_log_likelihood,
+    update_standstill,
+)
 from dropanchor_service.estimation.fleet.measurement.steps import update_steps
 from dropanchor_service.estimation.fleet.tuning import Tuning, TuningRecord
 
@@ -150,10 +163,16 @@ def _run_node(
     work: Hypotheses, count: int, row: Row, node: Node, anchors: Anchors, t: Tuning, scratch: Scratch, belief: Belief
 ) -> int:
     """Take a node into a row that has hypotheses. Return their count, 0 where the numbers are not finite."""
-    count = before_prediction(work, count, row, node, t)
+    count = follow_motion(work, count, row, node, t)
+    judge_standstill(work, count, row, node, t)
+    count = turn_back(work, count, row, node, t)
+    follow_rest(work, count, row, node)
     _predict_all(work, count, row, node, t, scratch)
     _fuse_motion(work, count, row, node, t, scratch)
-    count = after_prediction(work, count, row, node, t)
+    count = turn_device(work, count, node, t)
+    row.since_range_s += node.dt_s
+    widen_after_misfit(work, count, row, node, t)
+    count = expect_sight(work, count, row, node, t)
     belief.stuck = is_stuck(row, node, work[best_of(work, count)].mean[V])
     count = _fuse_measurement(work, count, row, node, anchors, t, scratch, belief)
     return _reduce_mixture(work, count, row, node, t) if all_finite(work, count) else 0
@@ -169,27 +188,6 @@ def _reset_after_fault(row: Row, pool: Pool, lane: int) -> None:
 
 
 @njit(nogil=True)
-def _follow(
-    work: Hypotheses,
-    count: int,
-    row: Row,
-    pool: Pool,
-    node: Node,
-    anchors: Anchors,
-    t: Tuning,
-    scratch: Scratch,
-    belief: Belief,
-) -> int:
-    """Take a node into a row that has hypotheses, which start again where they are wrong. Return their count."""
-    count = _run_node(work, count, row, node, anchors, t, scratch, belief)
-    if count == 0:
-        _reset_after_fault(row, pool, scratch.lane)
-    elif node.kind == RANGE and node.anchor == row.anchor and contradicts_ranges(work, count, row, t):
-        return restart_on_ring(work, count, row, node, anchors[row.anchor], t)
-    return count
-
-
-@njit(nogil=True)
 def _start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: Tuning) -> int:
     """Take a node into a row without hypotheses, and make the first ones where it has enough. Return their count."""
     if is_suspended(row, node):
@@ -201,17 +199,10 @@ def _start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: Tuning) 
 
 @njit(nogil=True)
 def _advance_row(
-    work: Hypotheses,
-    count: int,
-    row: Row,
-    pool: Pool,
-    node: Node,
-    anchors: Anchors,
-    t: Tuning,
-    scratch: Scratch,
-    belief: Belief,
+    space: Workspace, count: int, row: Row, pool: Pool, node: Node, anchors: Anchors, t: Tuning, belief: Belief
 ) -> int:
-    """Take one node into the row. Return the count of hypotheses."""
+    """Take one node into the row. Return the count of hypotheses, which start again where they are wrong."""
+    work, scratch = space.hypotheses, space.scratch
     if count > 0:
         accumulate_gap(work, count, row, node)
     if count > 0 and (
@@ -222,9 +213,14 @@ def _advance_row(
         release(row, pool, scratch.lane)
         forget(row, TRACK)
         count = 0
-    if count > 0:
-        return _follow(work, count, row, pool, node, anchors, t, scratch, belief)
-    return _start(work, row, node, anchors, t)
+    if count == 0:
+        return _start(work, row, node, anchors, t)
+    count = _run_node(work, count, row, node, anchors, t, scratch, belief)
+    if count == 0:
+        _reset_after_fault(row, pool, scratch.lane)
+    elif node.kind == RANGE and node.anchor == row.anchor and contradicts_ranges(work, count, row, t):
+        return restart_on_ring(work, count, row, node, anchors[row.anchor], t)
+    return count
 
 
 @njit(nogil=True, cache=True)
@@ -252,7 +248,7 @@ def advance(
         row.t_ns = node.t_ns
         belief = beliefs[k]
         take_height(row, node, belief)
-        count = _advance_row(work, count, row, pool, node, anchors, t, scratch, belief)
+        count = _advance_row(workspace[0], count, row, pool, node, anchors, t, belief)
         for h in range(count):
             mirror(work[h].cov)
         if count > 0:

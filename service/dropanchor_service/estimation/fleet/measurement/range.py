@@ -2,6 +2,13 @@
 
 Its variance is `range_variance`, with the noise that the row has learned (`belief/range_noise`). `update_range` is the
 likelihood; the numbers of its outliers are `outlier_*` in `tuning`.
+
+Of a height z above the anchor with the variance P, independent of the horizontal distance r,
+
+    E (r^2 + z^2) = r^2 + dz^2 + P        var sqrt(r^2 + z^2) = (dz^2 P + P^2 / 2) / distance^2
+
+A tag is no higher than its range: P counts as that of a uniform height within it at most. The error of a height lasts.
+What exceeds the bias that each range may have anyway is therefore counted once in `range_bias_tau`.
 """
 
 import math
@@ -26,11 +33,10 @@ from dropanchor_service.estimation.fleet.belief.layout import (
 )
 from dropanchor_service.estimation.fleet.belief.mixture import best_of
 from dropanchor_service.estimation.fleet.belief.range_noise import learn_lasting, learn_white, reported_var
-from dropanchor_service.estimation.fleet.belief.start import start_distance
+from dropanchor_service.estimation.fleet.belief.start import height_variance_at, offset_of, start_distance
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.height import TOLD
 from dropanchor_service.estimation.fleet.frontend.node import Node
-from dropanchor_service.estimation.fleet.measurement.height import height_variance, offset_of
 from dropanchor_service.estimation.fleet.measurement.scalar import gaussian, project, record_innovation, update_pda
 from dropanchor_service.estimation.fleet.measurement.speed import bound_speed
 from dropanchor_service.estimation.fleet.tuning import Tuning
@@ -38,6 +44,8 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 ONE_SIDED: Final = 1.5  # standard deviations: an innovation beyond counts for a run of ranges too long or too short
 MISFIT_GAIN: Final = 0.1  # weight of the newest range in the mean outlier probability
 NEAREST: Final = 1e-3  # m
+COVERED_STD: Final = 0.15  # m, of an error of a range that lasts: the filter allows for it
+SHORTEST_S: Final = 0.02  # s between two ranges
 
 
 @njit(nogil=True)
@@ -157,3 +165,24 @@ def _update_misfit(row: Row, y: float, S: float, p_outlier: float) -> None:
     nlos.high_run = nlos.high_run + 1 if y > ONE_SIDED * math.sqrt(S) else 0
     nlos.low_run = nlos.low_run + 1 if y < -ONE_SIDED * math.sqrt(S) else 0
     nlos.misfit += MISFIT_GAIN * (p_outlier - nlos.misfit)
+
+
+@njit(nogil=True)
+def take_height(row: Row, node: Node, belief: Belief) -> None:
+    """Take the node's height into the row, unless it is as told, and into what is published."""
+    settings = row.settings
+    if node.height_std > 0.0:
+        settings.height, settings.height_std = node.height, node.height_std
+        settings.height_source = node.height_source
+    belief.z, belief.z_std = settings.height, settings.height_std
+
+
+@njit(nogil=True)
+def height_variance(row: Row, dz: float, distance: float, t: Tuning) -> float:
+    """Return what a height that nobody told adds to the variance of a range, m^2, beside its first-order term."""
+    settings = row.settings
+    P = height_variance_at(settings, distance)
+    second = P * P / (2.0 * distance * distance)
+    all_of_it = settings.range_scale**2 * (dz * dz * P / (distance * distance) + second)
+    lasting = max(all_of_it - COVERED_STD**2, 0.0) * t.range_bias_tau / max(row.since_range_s, SHORTEST_S)
+    return float(settings.range_scale**2 * second + lasting)

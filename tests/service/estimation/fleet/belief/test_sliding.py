@@ -8,7 +8,7 @@ import pytest
 
 from dropanchor_service.estimation.columns import default_settings
 from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, GYRO_BIAS, LEFT_BIAS, MOUNT, SLIP, N, V
-from dropanchor_service.estimation.fleet.belief.sliding import follow_sliding, slides
+from dropanchor_service.estimation.fleet.belief.rigidity import follow_sliding, slides
 from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.frontend.node import MOVING, RESTING
 from dropanchor_service.estimation.fleet.tuning import Tuning

@@ -8,10 +8,10 @@ import pytest
 from dropanchor_service.estimation.columns import State, default_settings
 from dropanchor_service.estimation.fleet.belief.layout import PHI, V
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
-from dropanchor_service.estimation.fleet.belief.standing import judge_standstill
 from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.frontend.node import MOVING, RESTING
+from dropanchor_service.estimation.fleet.measurement.rest import judge_standstill
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.belief import node_of
 from support.fleet_tracks import DT, Drive, rows_of, run, sense

@@ -11,10 +11,10 @@ from dropanchor_service.estimation.fleet.belief.births.numbers import PUSHED_BAC
 from dropanchor_service.estimation.fleet.belief.layout import Hypotheses, Hypothesis, Row, V
 from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis, gets_child
 from dropanchor_service.estimation.fleet.belief.rigidity import is_mount_untold
-from dropanchor_service.estimation.fleet.belief.standing import SLOW
 from dropanchor_service.estimation.fleet.belief.start import starts_at_place
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import RESTING, Node
+from dropanchor_service.estimation.fleet.measurement.rest import SLOW
 from dropanchor_service.estimation.fleet.tuning import Tuning, is_on
 
 STOOD_S: Final = 0.1  # s of rest after which a tag may drive off in the other direction
