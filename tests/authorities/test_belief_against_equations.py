@@ -181,9 +181,10 @@ def test_a_range_mixes_hit_and_outlier_by_their_probabilities() -> None:
 def test_a_bearing_moves_the_tag_towards_it() -> None:
     s, P = STATE.copy(), covariance()
     P[PHI, PHI] += 0.2
-    update_bearing(s, P, np.zeros(N), np.zeros(N), 0.0, 0.0, 0.9, math.nan, 1e-4, np.zeros(3))
-    assert s[PHI] == pytest.approx(0.9, abs=0.01)
-    assert np.linalg.eigvalsh(P).min() > 0
+    one, scratch = hypothesis_of(s, P)
+    update_bearing(one, scratch, 0.0, 0.0, 0.9, math.nan, 1e-4)
+    assert one["mean"][PHI] == pytest.approx(0.9, abs=0.01)
+    assert np.linalg.eigvalsh(one["cov"]).min() > 0
 
 
 def test_a_negative_speed_is_cut_to_the_moments_of_the_truncated_gaussian() -> None:

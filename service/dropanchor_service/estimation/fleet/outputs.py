@@ -7,8 +7,8 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, Array, MeasurementKind
 from dropanchor_service.estimation.fleet.belief.layout import Anchors, Beliefs, Pool, Rows
-from dropanchor_service.estimation.fleet.belief.modes import list_modes
 from dropanchor_service.estimation.fleet.belief.parts import PARTS
+from dropanchor_service.estimation.fleet.belief.publish import list_modes
 from dropanchor_service.estimation.fleet.belief.states import AMBIGUOUS
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.event import PRESSURE_EVENT

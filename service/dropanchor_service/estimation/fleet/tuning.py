@@ -54,7 +54,6 @@ class Tuning(NamedTuple):
     outlier_std: float = 0.8  # m
     outlier_floor: float = 1e-4  # 1/m, density of an outlier of any length
     nlos_log_prior: float = -2.5  # of a line of sight that was lost, or is back
-    nlos_min_bias: float = 0.15  # m, extra bias below which there is a line of sight
     nlos_max_bias: float = 3.6  # m, extra bias above which the track is wrong and not the range
     nlos_tau: float = 2.0  # s
     nlos_run: int = 4  # ranges in a row that are too long or too short

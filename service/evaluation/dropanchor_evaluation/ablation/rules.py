@@ -67,7 +67,7 @@ RULES: Final = (
     Rule(
         "birth: any without a line of sight",
         "S5+nlosburst/*",
-        births=("sight-expected", "sight-lost", "sight-back", "sight-closed"),
+        births=("sight-expected", "sight-lost", "sight-back"),
     ),
     Rule("outliers of ranges", "S5+nlos*/*", {"outlier_probability": 1e-9, "outlier_floor": 1e-12}),
     Rule("floor of the outliers", "*/scalar/everything/known", {"outlier_floor": 0.0}),
@@ -109,7 +109,7 @@ RULES: Final = (
     Rule("size of gravity is learned", "*/9-axis/*/*", constants={"frontend.attitude:TAU_GRAVITY": 1e9}),
     Rule("tilt of a gyroscope that no rest has taught", "*/9-axis/*/*", constants={"belief.tilt:TILTING_S": 1e9}),
     Rule("standstill", "*/*/*/*", constants={"frontend.standstill:HOLD": math.inf}),
-    Rule("magnetic disturbance", "*/9-axis/nothing/*", constants={"frontend.disturbance:GATE": 1e9}),
+    Rule("magnetic disturbance", "*/9-axis/nothing/*", constants={"frontend.magnetometer:GATE": 1e9}),
     Rule("lasting error of north", "*/9-axis/nothing/*", constants={"frontend.magnetometer:SYSTEMATIC": 0.0}),
     Rule("direction of the steps", "walk-*/*/*/*", {"gait_angle_std": 1e3}),
     Rule(

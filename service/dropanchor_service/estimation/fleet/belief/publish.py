@@ -1,12 +1,24 @@
-"""What is published of a row: pose, covariance, weight of its mode, observability, state and reason."""
+"""What is published of a row: pose, covariance, weight of its mode, observability, state, reason, and other modes."""
 
 import math
 from typing import Final
 
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.belief.births.sight import MISFIT_LIMIT
-from dropanchor_service.estimation.fleet.belief.layout import Anchors, Belief, Floats, Hypotheses, Row, Scratch
+from dropanchor_service.estimation.fleet.belief.layout import (
+    Anchors,
+    Belief,
+    Floats,
+    Hypotheses,
+    Pool,
+    Row,
+    Scratch,
+    Workspace,
+)
+from dropanchor_service.estimation.fleet.belief.mixture import normalise
 from dropanchor_service.estimation.fleet.belief.observability import predict_information, sigma_obs
 from dropanchor_service.estimation.fleet.belief.parts import fill_parts
+from dropanchor_service.estimation.fleet.belief.pool import load
 from dropanchor_service.estimation.fleet.belief.rigidity import is_askew, slides
 from dropanchor_service.estimation.fleet.belief.start import is_mirrored
 from dropanchor_service.estimation.fleet.belief.states import (
@@ -26,6 +38,9 @@ from dropanchor_service.estimation.fleet.belief.states import (
 )
 from dropanchor_service.estimation.fleet.belief.summary import (
     best_mode,
+    cluster,
+    fill_positions,
+    moments,
     spread_over_all,
     spread_over_families,
     widen_by_reference,
@@ -42,6 +57,7 @@ RERESOLVE_AFTER: Final = 3.0  # s without a range after which one mode has to ex
 COASTING_AFTER, RANGES_LOST_AFTER = 1.5, 30.0  # s without a range
 IMU_DEGRADED_AFTER, IMU_LOST_AFTER = 0.5, 10.0  # s that no sensor observed
 SMALL_M, SMALL_SHARE = 1.5, 0.1  # a mode is small below 1.5 m or 10 % of the distance
+LIGHTEST: Final = 0.01  # weight of a mode that is listed
 LARGE_M, LARGE_SHARE = 3.0, 0.35  # an ellipse is too large for use above 3 m or 35 % of the distance
 
 
@@ -153,3 +169,40 @@ def _set_state(row: Row, rivals: bool, undecided: bool, relative: float, sigma: 
         publication.state, publication.reason = DEGRADED, RANGES_REJECTED
     else:
         publication.state, publication.reason = TRACKING, RESOLVED
+
+
+@njit(nogil=True)
+def _heaviest(work: Hypotheses, count: int) -> int:
+    head = -1
+    for h in range(count):
+        if not work[h].assigned and (head < 0 or work[h].log_weight > work[head].log_weight):
+            head = h
+    return head
+
+
+@njit(nogil=True)
+def list_modes(row: Row, pool: Pool, anchors: Anchors, space: Workspace, modes: Array) -> int:
+    """Fill modes (HYPOTHESIS of `columns`) with the modes above 1 % of the weight. Return their number."""
+    count = row.count
+    work, scratch = space.hypotheses, space.scratch
+    mean, cov = scratch.mean, scratch.cov
+    load(row, pool, work)
+    for h in range(count):
+        work[h].assigned = False
+    if count > 0:
+        normalise(work, count)
+        fill_positions(work, count)
+    for n in range(len(modes)):
+        head = _heaviest(work, count)
+        weight = cluster(work, count, head) if head >= 0 else 0.0
+        if weight < LIGHTEST:
+            return n
+        moments(work, count, head, scratch)
+        widen_by_reference(row, scratch)
+        for h in range(count):
+            work[h].assigned |= work[h].in_mode
+        mode, anchor = modes[n], anchors[row.anchor]
+        mode.weight = min(weight, 1.0)
+        mode.x, mode.y, mode.heading, mode.speed = mean[0] + anchor.x, mean[1] + anchor.y, mean[2], mean[3]
+        mode.cov[:, :] = cov[:2, :2]
+    return len(modes)

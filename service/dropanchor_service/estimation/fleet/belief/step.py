@@ -132,7 +132,7 @@ def _fuse_measurement(
         count = push_back(work, count, row, node, t)
         update_with_range(work, count, row, node, anchors, t, scratch, belief)
         row.since_range_s = 0.0
-        count = follow_jumps(work, count, row, t, scratch)
+        count = follow_jumps(work, count, row, t)
     if node.kind == BEARING and row.anchor >= 0:
         update_with_bearing(work, count, row, node, anchors, t, scratch, belief)
     return count

@@ -22,13 +22,15 @@ from dropanchor_service.estimation.fleet.frontend.gait import (
     GAIT,
     MAX_INTERVAL,
     MM_PER_M,
+    STRIDE,
     WALK,
     add_step_sample,
+    add_stride_sample,
     start_gait,
     step_speed,
+    stride_direction,
 )
 from dropanchor_service.estimation.fleet.frontend.node import Node
-from dropanchor_service.estimation.fleet.frontend.stride import STRIDE, add_stride_sample, stride_direction
 
 CARRYING: Final = np.dtype(
     [

@@ -1,4 +1,4 @@
-"""Steps of a walking person, from the size of the acceleration, and the speed that they give.
+"""Steps of a walking person, from the size of the acceleration, and the speed and the direction that they give.
 
 x is |a|, high-passed (TAU_HIGH) and low-passed (two poles at TAU_LOW). A step is a peak of x from which x has fallen by
 `reversal`, and that came at least MIN_INTERVAL after the one before. With the height W of a peak above the
@@ -9,6 +9,14 @@ lowest point before it and the time T since the last peak, a step has (Kim 2004)
 A person walks when steps of at least MIN_SWING came at similar intervals, and W adds up to WALK over them: three of a
 phone that swings in the hand, four of one that is held still. No recorded robot, drone or cart reached that
 (`tests/service/estimation/fleet/test_recorded_honesty.py`).
+
+With every step a walker is pushed forward while the upward acceleration grows. The horizontal acceleration a (level
+frame) is therefore correlated with the rate of change of the upward acceleration, and points along the course:
+
+    g = sum a dv/dt,    coherence = |g| / sqrt(sum |a|^2  sum (dv/dt)^2)
+
+All three axes pass the same filter (0.8 to 3 Hz) first. A device in one hand also swings sideways in this rhythm, which
+turns g by a constant angle.
 """
 
 import math
@@ -38,6 +46,15 @@ GAIT: Final = np.dtype(
 )
 Gait: TypeAlias = Any  # a record of GAIT
 
+STRIDE: Final = np.dtype(
+    [
+        ("slow", "f8", 3),  # m/s^2, slow mean of the acceleration east, north, up in the level frame
+        ("low", "f8", (2, 3)),  # m/s^2, two poles of the rest
+        ("sums", "f8", 4),  # of a dv/dt (2), |a|^2 and (dv/dt)^2, with forgetting
+    ]
+)
+Stride: TypeAlias = Any  # a record of STRIDE
+
 TAU_HIGH = 1.5  # s
 TAU_LOW = 0.04  # s, of each of two poles: 2.6 Hz together
 MIN_INTERVAL, MAX_INTERVAL = 0.28, 1.2  # s
@@ -50,6 +67,8 @@ MOST_REGULAR = 100 * WALK  # a walk of days must not overflow
 FORGET = 1.5  # s of steps in the mean speed
 STEP_LENGTH = 0.362  # m per (m/s^2)^(1/3)
 FIRST_STEP = 0.5  # of its length: the way of somebody who stood until its peak
+STRIDE_TAU_HIGH = 0.2  # s: 0.8 Hz
+STRIDE_FORGET = 2.0  # s
 
 
 @njit(cache=True, nogil=True)
@@ -129,3 +148,28 @@ def _length(swing: float) -> float:
 def step_speed(g: Gait) -> float:
     """Return the speed of the last steps, m/s."""
     return g.length_sum / g.time_sum if g.time_sum > 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True)
+def add_stride_sample(d: Stride, dt: float, east: float, north: float, up: float) -> None:
+    """Take one acceleration, m/s^2, in the level frame, without gravity."""
+    high, k, kept = dt / (STRIDE_TAU_HIGH + dt), dt / (TAU_LOW + dt), 1.0 - dt / STRIDE_FORGET
+    for i, value in enumerate((east, north, up)):
+        d.slow[i] += high * (value - d.slow[i])
+        d.low[0, i] += k * (value - d.slow[i] - d.low[0, i])
+        d.low[1, i] += k * (d.low[0, i] - d.low[1, i])
+    x, y = d.low[1, 0], d.low[1, 1]
+    rate = (d.low[0, 2] - d.low[1, 2]) / TAU_LOW
+    d.sums[0] = kept * d.sums[0] + dt * x * rate
+    d.sums[1] = kept * d.sums[1] + dt * y * rate
+    d.sums[2] = kept * d.sums[2] + dt * (x * x + y * y)
+    d.sums[3] = kept * d.sums[3] + dt * rate * rate
+
+
+@njit(cache=True, nogil=True)
+def stride_direction(d: Stride) -> tuple[float, float]:
+    """Return (azimuth in the level frame, rad; coherence, 0 to 1)."""
+    scale = math.sqrt(d.sums[2] * d.sums[3])
+    if scale <= 0.0:
+        return 0.0, 0.0
+    return math.atan2(d.sums[1], d.sums[0]), math.hypot(d.sums[0], d.sums[1]) / scale

@@ -4,7 +4,16 @@ import math
 from typing import Final
 
 from dropanchor_service.estimation.fleet.angles import TWO_PI, wrap
-from dropanchor_service.estimation.fleet.belief.layout import PHI, Anchors, Belief, Floats, Hypotheses, R, Row, Scratch
+from dropanchor_service.estimation.fleet.belief.layout import (
+    PHI,
+    Anchors,
+    Belief,
+    Hypotheses,
+    Hypothesis,
+    R,
+    Row,
+    Scratch,
+)
 from dropanchor_service.estimation.fleet.belief.mixture import best_of
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import Node
@@ -16,22 +25,15 @@ BEARING_OUTLIER: Final = 0.05  # probability that a bearing says nothing
 
 @njit(nogil=True)
 def update_bearing(
-    s: Floats,
-    P: Floats,
-    H: Floats,
-    PH: Floats,
-    ox: float,
-    oy: float,
-    z: float,
-    mirrored: float,
-    variance: float,
-    out: Floats,
+    one: Hypothesis, scratch: Scratch, ox: float, oy: float, z: float, mirrored: float, variance: float
 ) -> float:
     """Update with the azimuth z, rad, of the tag seen from an anchor at (ox, oy) from the primary one.
 
     mirrored: the azimuth, rad, that looks the same to the anchor, NaN: none. The one nearer to the hypothesis counts.
-    An outlier may have any azimuth. out receives (innovation, S, probability of an outlier). Return the log likelihood.
+    An outlier may have any azimuth. scratch.out receives (innovation, S, probability of an outlier). Return the log
+    likelihood.
     """
+    s, P, H, PH, out = one.mean, one.cov, scratch.H, scratch.PH, scratch.out
     H[:] = 0.0
     c, sn = math.cos(s[PHI]), math.sin(s[PHI])
     dx, dy = s[R] * c - ox, s[R] * sn - oy
@@ -62,8 +64,7 @@ def update_with_bearing(
     mirrored = 2.0 * anchor.facing + math.pi - node.z if anchor.mirrors else math.nan
     best = best_of(work, count)
     for h in range(count):
-        s, P = work[h].mean, work[h].cov
-        likelihood = update_bearing(s, P, scratch.H, scratch.PH, ox, oy, node.z, mirrored, variance, out)
+        likelihood = update_bearing(work[h], scratch, ox, oy, node.z, mirrored, variance)
         work[h].log_weight += t.likelihood_power * likelihood
         if h == best:
             record_innovation(belief, out[0], out[1], out[2])

@@ -14,7 +14,7 @@ from dropanchor_service.estimation.fleet.frontend.carrying import (
     start_carrying,
     yaw_of_carried,
 )
-from dropanchor_service.estimation.fleet.frontend.stride import STRIDE, add_stride_sample, stride_direction
+from dropanchor_service.estimation.fleet.frontend.gait import STRIDE, add_stride_sample, stride_direction
 
 
 def product(a: Any, b: Any) -> Any:

@@ -1,18 +1,16 @@
 """A line of sight that is lost for seconds, and a track that has lost its ranges.
 
 Without line of sight every range is too long by one nearly constant amount. A second hypothesis with a larger range
-bias keeps what such ranges still say. It is born when several ranges in a row are too long, and closed when the bias
-is that of a line of sight again.
+bias keeps what such ranges still say. It is born when several ranges in a row are too long, and loses weight by time to
+one with a line of sight again.
 """
 
-import math
 from typing import Final
 
 from dropanchor_service.estimation.fleet.belief.births.forgetting import RUNS, forget
 from dropanchor_service.estimation.fleet.belief.births.numbers import (
     RING_AGAIN,
     SIGHT_BACK,
-    SIGHT_CLOSED,
     SIGHT_EXPECTED,
     SIGHT_LOST,
     WIDENED,
@@ -22,29 +20,25 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     RANGE_BIAS,
     Floats,
     Hypotheses,
-    Hypothesis,
     N,
     R,
     Row,
-    Scratch,
     V,
 )
 from dropanchor_service.estimation.fleet.belief.mixture import LIGHT, best_of, copy_hypothesis, gets_child
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import Node
-from dropanchor_service.estimation.fleet.measurement.scalar import update_component
 from dropanchor_service.estimation.fleet.tuning import Tuning, is_on
 
 OFFER_EVERY: Final = 1.0  # s between offers of a line of sight
 MISFIT_LIMIT: Final = 0.5  # mean outlier probability above which most ranges are outliers
-CLOSE_SIGMAS, CLOSE_SLACK = 1.5, 0.2  # standard deviations and m within which a bias is that of a line of sight
 AGREEMENT: Final = 0.2  # mean outlier probability below which the ranges agree with the track
 MAX_WIDENED: Final = 2  # times that a track is widened before it is given up
 WIDEN_POSITION, WIDEN_SPEED = 1.0, 0.5  # m^2 and (m/s)^2 by which a track with a misfit is widened
 
 
 @njit(nogil=True)
-def follow_jumps(work: Hypotheses, count: int, row: Row, t: Tuning, scratch: Scratch) -> int:
+def follow_jumps(work: Hypotheses, count: int, row: Row, t: Tuning) -> int:
     """Lose and find lines of sight where several ranges in a row were too long or too short. Return the count."""
     longer = row.nlos.high_run >= t.nlos_run
     if longer or row.nlos.low_run >= t.nlos_run:
@@ -57,9 +51,6 @@ def follow_jumps(work: Hypotheses, count: int, row: Row, t: Tuning, scratch: Scr
                 copy_los(work, h, count, t)
                 count += 1
         forget(row, RUNS)
-    for h in range(count):
-        if is_on(SIGHT_CLOSED, t) and has_sight_again(work[h], t):
-            close_sight(work[h], scratch.PH)
     return count
 
 
@@ -141,21 +132,3 @@ def contradicts_ranges(work: Hypotheses, count: int, row: Row, t: Tuning) -> boo
     extra = best.mean[RANGE_BIAS] - best.los_bias if best.nlos == 1 else 0.0
     wrong = row.nlos.widened >= MAX_WIDENED or extra > t.nlos_max_bias
     return bool(wrong and is_on(RING_AGAIN, t))
-
-
-@njit(nogil=True)
-def has_sight_again(one: Hypothesis, t: Tuning) -> bool:
-    """Return whether the extra bias of an NLOS hypothesis has gone."""
-    if one.nlos == 0:
-        return False
-    extra = one.mean[RANGE_BIAS] - one.los_bias
-    sigma = math.sqrt(one.cov[RANGE_BIAS, RANGE_BIAS])
-    certain = extra + 2.0 * sigma < t.nlos_min_bias + CLOSE_SLACK
-    return bool(certain and extra < min(t.nlos_min_bias, CLOSE_SIGMAS * sigma))
-
-
-@njit(nogil=True)
-def close_sight(one: Hypothesis, PH: Floats) -> None:
-    """Give an NLOS hypothesis the bias of its line of sight again."""
-    one.nlos = 0
-    update_component(one.mean, one.cov, PH, RANGE_BIAS, one.los_bias, max(one.los_bias_var, 1e-6))
