@@ -7,10 +7,11 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import default_settings
 from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, RANGE_BIAS, ROW, N, R, V
+from dropanchor_service.estimation.fleet.belief.workspace import WORKING_HYPOTHESIS
 from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.frontend.node import NODE, RANGE
 from dropanchor_service.estimation.fleet.smoother.back import predict_moments, set_row, step_back
-from dropanchor_service.estimation.fleet.smoother.trace import TRACE, TRACED
+from dropanchor_service.estimation.fleet.smoother.trace import TRACE
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.fleet_runs import traced
 from support.fleet_tracks import CALIBRATED
@@ -51,10 +52,10 @@ def model(nodes: Any, t: Tuning) -> tuple[Any, Any]:
 
 
 def filtered(nodes: Any, t: Tuning) -> Any:
-    """Return TRACED of every node by the linear Kalman filter."""
+    """Return WORKING_HYPOTHESIS of every node by the linear Kalman filter."""
     (A, q), h = model(nodes, t), np.array([1.0, 0.0, 0.0, 1.0])
     x, P = np.array(PRIOR[0]), np.diag(PRIOR[1])
-    kept = np.zeros(len(nodes), TRACED)
+    kept = np.zeros(len(nodes), WORKING_HYPOTHESIS)
     for k, node in enumerate(nodes):
         if k > 0:
             f, dt = node["dv_forward"], node["dt_s"]

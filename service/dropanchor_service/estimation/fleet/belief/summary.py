@@ -26,14 +26,8 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 
 
 @njit(nogil=True)
-def planar_covariance(s: Floats, P: Floats, out: Floats) -> None:
-    """Fill out (3, 3) with the covariance of (x, y, course) from the polar covariance."""
-    planar_covariance_towards(math.cos(s[PHI]), math.sin(s[PHI]), s[R], P, out)
-
-
-@njit(nogil=True)
-def planar_covariance_towards(c: float, sn: float, r: float, P: Floats, out: Floats) -> None:
-    """Fill out as `planar_covariance` does, for a tag in the direction (c, sn) at distance r."""
+def planar_covariance(c: float, sn: float, r: float, P: Floats, out: Floats) -> None:
+    """Fill out (3, 3) with the covariance of (x, y, course) of a tag in the direction (c, sn) at distance r."""
     prr, ppp, prp = P[R, R], P[PHI, PHI], P[R, PHI]
     out[0, 0] = c * c * prr - 2 * c * sn * r * prp + sn * sn * r * r * ppp
     out[1, 1] = sn * sn * prr + 2 * c * sn * r * prp + c * c * r * r * ppp
@@ -161,7 +155,7 @@ def _add_spread(one: Hypothesis, w: float, x0: float, y0: float, course0: float,
     cov, part, point = scratch.cov, scratch.part, scratch.point
     point[0], point[1] = one.position[0] - x0, one.position[1] - y0
     point[2] = wrap(course_of(one.mean) - course0)
-    planar_covariance_towards(one.direction[0], one.direction[1], one.mean[R], one.cov, part)
+    planar_covariance(one.direction[0], one.direction[1], one.mean[R], one.cov, part)
     for i in range(3):
         for j in range(3):
             cov[i, j] += w * (part[i, j] + point[i] * point[j])

@@ -32,6 +32,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     REFERENCE,
     YAW,
     Floats,
+    Hypothesis,
     N,
     R,
     Row,
@@ -53,7 +54,6 @@ CONTRADICTED: Final = 37.0  # chi-square of 11 degrees of freedom, exceeded once
 SINGULAR: Final = 1e-9  # share of a variance that the states before it leave, below which they tell it exactly
 
 Trace = Any  # a record of TRACE
-Traced = Any  # a record of TRACED
 
 
 @njit(nogil=True, cache=True)
@@ -75,7 +75,7 @@ def predict_mean(s: Floats, node: Node, decay: Floats, F: Floats, enters: bool) 
 
 @njit(nogil=True, cache=True)
 def predict_moments(
-    one: Traced, child: Traced, node: Node, row: Row, after: Trace, enters: bool, t: Tuning
+    one: Hypothesis, child: Hypothesis, node: Node, row: Row, after: Trace, enters: bool, t: Tuning
 ) -> tuple[Floats, Floats, Floats]:
     """Return the predicted mean and covariance of a hypothesis, and its covariance with its prediction."""
     decay, growth, F, A = np.ones(N), np.zeros(N), np.zeros((4, N)), np.zeros((4, N))
@@ -138,7 +138,7 @@ def _follow_heading(s: Floats, P: Floats, C: Floats, node: Node, row: Row, after
 
 
 @njit(nogil=True)
-def _follow_branches(s: Floats, P: Floats, one: Traced, child: Traced, node: Node, t: Tuning) -> None:
+def _follow_branches(s: Floats, P: Floats, one: Hypothesis, child: Hypothesis, node: Node, t: Tuning) -> None:
     """Allow for what a hypothesis may have become at the node: one without a line of sight, or a device that turned."""
     if one.nlos != child.nlos:
         P[RANGE_BIAS, RANGE_BIAS] += t.outlier_mean**2 + t.outlier_std**2
@@ -149,7 +149,7 @@ def _follow_branches(s: Floats, P: Floats, one: Traced, child: Traced, node: Nod
 
 
 @njit(nogil=True, cache=True)
-def step_back(mean: Floats, cov: Floats, one: Traced, s: Floats, P: Floats, C: Floats) -> bool:
+def step_back(mean: Floats, cov: Floats, one: Hypothesis, s: Floats, P: Floats, C: Floats) -> bool:
     """Step smoothed moments back to the hypothesis `one` before the node. Return whether they continue it.
 
     s, P, C: from `predict_moments`.

@@ -19,9 +19,10 @@ import numpy as np
 from dropanchor_service.estimation.columns import Array, Frame, State
 from dropanchor_service.estimation.fleet.belief.heading_models import reference_std
 from dropanchor_service.estimation.fleet.belief.summary import add_reference_variance
+from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 from dropanchor_service.estimation.fleet.frontend.node import RANGE
 from dropanchor_service.estimation.fleet.outputs import poses_of
-from dropanchor_service.estimation.fleet.smoother.lineage import make_followed, smooth_back
+from dropanchor_service.estimation.fleet.smoother.lineage import smooth_back
 from dropanchor_service.estimation.fleet.smoother.trace import Run, TracingEngine
 
 STRIDE: Final = 0.25  # of the lag: nodes so close together share the end of their data
@@ -61,8 +62,8 @@ def _smooth(engine: TracingEngine, run: Run, row: int, lag: float | None) -> tup
         return points, covs
     anchor = engine.anchors[now["anchor"][0]]
     published = np.stack([run.beliefs["x"] - anchor["x"], run.beliefs["y"] - anchor["y"]], axis=1)
-    trusted, followed = run.beliefs["state"] == State.TRACKING, make_followed()
-    of_run = followed, run.nodes, run.traces, run.hypotheses, published, trusted
+    trusted, space = run.beliefs["state"] == State.TRACKING, make_workspace()
+    of_run = space, run.nodes, run.traces, run.hypotheses, published, trusted
     for span in _spans(run.nodes["t_ns"], run.traces["carried"], lag):
         smooth_back(*of_run, span, now, engine.tuning, points, covs)
     return points, covs

@@ -5,9 +5,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.estimation.fleet.belief.layout import BELIEF, MAX_HYPOTHESES, Anchors, Beliefs, N, Pool, Rows
+from dropanchor_service.estimation.fleet.belief.layout import BELIEF, MAX_HYPOTHESES, Anchors, Beliefs, Pool, Rows
 from dropanchor_service.estimation.fleet.belief.pool import fitted, load
 from dropanchor_service.estimation.fleet.belief.step import advance
+from dropanchor_service.estimation.fleet.belief.workspace import WORKING_HYPOTHESIS
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.fleet.frontend.node import NODE, Nodes
@@ -28,17 +29,6 @@ TRACE: Final = np.dtype(
     ]
 )
 
-TRACED: Final = np.dtype(
-    [
-        ("log_weight", np.float64),
-        ("heading_class", np.int32),
-        ("nlos", np.int32),
-        ("aligned", np.int32),
-        ("mean", np.float64, (N,)),
-        ("cov", np.float64, (N, N)),
-    ]
-)
-
 
 class Run(NamedTuple):
     """The nodes of one row, in order of time, with what the engine made of each."""
@@ -46,7 +36,7 @@ class Run(NamedTuple):
     nodes: Array  # NODE
     beliefs: Array  # BELIEF
     traces: Array  # TRACE
-    hypotheses: Array  # TRACED
+    hypotheses: Array  # WORKING_HYPOTHESIS
 
 
 class TracingEngine(FleetEngine):
@@ -72,7 +62,7 @@ class TracingEngine(FleetEngine):
 
     def traced(self, row: int) -> Run:
         """Return what was traced of a row so far."""
-        empty = Run(np.zeros(0, NODE), np.zeros(0, BELIEF), np.zeros(0, TRACE), np.zeros(0, TRACED))
+        empty = Run(np.zeros(0, NODE), np.zeros(0, BELIEF), np.zeros(0, TRACE), np.zeros(0, WORKING_HYPOTHESIS))
         nodes, beliefs, traces, hypotheses = (np.concatenate(parts) for parts in zip(empty, *self._steps, strict=True))
         own = nodes["row"] == row
         return Run(nodes[own], beliefs[own], traces[own], hypotheses)
@@ -83,7 +73,7 @@ class TracingEngine(FleetEngine):
         return 0
 
     def _trace(self, nodes: Array, beliefs: Array, workspace: Array) -> None:
-        traces, room = np.zeros(len(nodes), TRACE), np.zeros(len(nodes) * MAX_HYPOTHESES, TRACED)
+        traces, room = np.zeros(len(nodes), TRACE), np.zeros(len(nodes) * MAX_HYPOTHESES, WORKING_HYPOTHESIS)
         self._pool = fitted(self._pool, self._rows[: self._configured], MAX_HYPOTHESES * len(np.unique(nodes["row"])))
         used = advance_traced(
             self._rows, self._pool, nodes, self._anchors, self._tuning_record, workspace, beliefs, traces, room
@@ -116,10 +106,6 @@ def advance_traced(
         trace.first, trace.count = used, row.count
         load(row, pool, work)
         for h in range(row.count):
-            kept, one = room[used], work[h]
-            kept.log_weight, kept.heading_class = one.log_weight, one.heading_class
-            kept.nlos, kept.aligned = one.nlos, one.aligned
-            kept.mean[:] = one.mean
-            kept.cov[:, :] = one.cov
+            room[used] = work[h]
             used += 1
     return used
