@@ -14,7 +14,7 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 FOLDER: Final = Path(fleet.__file__).parent
 CODES: Final = {
     *("belief/layout.py", "belief/states.py", "frontend/assembly.py", "frontend/event.py", "frontend/node.py"),
-    *("frontend/ordering.py", "frontend/pending.py", "belief/births/forgetting.py", "belief/births/numbers.py"),
+    *("frontend/ordering.py", "belief/births/forgetting.py", "belief/births/numbers.py"),
 }
 """Files whose integers are codes, indices and sizes of arrays."""
 TUNING: Final = "tuning.py"

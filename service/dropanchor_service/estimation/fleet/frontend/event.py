@@ -10,6 +10,9 @@ RANGE_EVENT: Final = 2
 BEARING_EVENT: Final = 3
 PRESSURE_EVENT: Final = 4
 
+NONE: Final = -1  # index of no sample, and no anchor
+UNTOUCHED: Final = -2  # of a row without samples in a batch
+
 EVENT: Final = np.dtype(
     [
         ("row", np.int32),

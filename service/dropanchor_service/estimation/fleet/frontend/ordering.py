@@ -6,16 +6,15 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import LAG, Array, SampleBatch
 from dropanchor_service.estimation.fleet.frontend.batching import MAX_LAG_S, REORDER_WINDOW
-from dropanchor_service.estimation.fleet.frontend.event import EVENT, KINDS, REASONS, REJECTION
-from dropanchor_service.estimation.fleet.frontend.pending import (
-    NONE,
+from dropanchor_service.estimation.fleet.frontend.event import EVENT, KINDS, NONE, REASONS, REJECTION, UNTOUCHED
+from dropanchor_service.estimation.fleet.frontend.sorting import (
+    REJECTED,
     ROW_QUEUE,
-    UNTOUCHED,
-    Pending,
-    append_pending,
-    drop_pending,
+    TOUCHED,
+    WAITING,
+    Batch,
+    order_samples,
 )
-from dropanchor_service.estimation.fleet.frontend.sorting import REJECTED, TOUCHED, Batch, order_samples
 
 NEVER: Final = np.iinfo(np.int64).min // 2
 FIRST_CAPACITY: Final = 64
@@ -47,7 +46,7 @@ class SampleQueue:
         self._max_lag_ns = round(max_lag_s * 1e9) - REORDER_WINDOW
         self._rows = 0
         self._queues = _make_queues(0)
-        self._pending = _make_pending(FIRST_CAPACITY)
+        self._waiting = np.zeros(0, EVENT)
         self._batch = _make_batch(FIRST_CAPACITY)
 
     def reach(self, rows: int) -> None:
@@ -60,14 +59,13 @@ class SampleQueue:
     def forget(self, row: int) -> None:
         """Drop all that is known of `row`."""
         self.reach(row + 1)
-        drop_pending(self._queues[row], self._pending)
+        self._waiting = self._waiting[self._waiting["row"] != row]
         self._queues[row] = _make_queues(1)[0]
 
     def state(self) -> dict[str, Array]:
         """Return what a checkpoint needs: the pending events, and the times of the newest samples."""
-        parts = [self._pending_of(row) for row in np.flatnonzero(self._queues["pending"] != NONE).tolist()]
         return {
-            "pending": np.concatenate([np.zeros(0, EVENT), *parts]),
+            "pending": self._waiting.copy(),
             "imu": self._queues["imu"][: self._rows].copy(),
             "newest": self._queues["newest"][: self._rows].copy(),
             "batching": self._queues["batching"][: self._rows].copy(),
@@ -75,14 +73,11 @@ class SampleQueue:
 
     def restore(self, state: dict[str, Array]) -> None:
         """Take over what `state` returned."""
-        self._pending, self._batch = _make_pending(FIRST_CAPACITY), _make_batch(FIRST_CAPACITY)
+        self._waiting = state["pending"].copy()
         self._rows = len(state["imu"])
         self._queues = _make_queues(self._rows)
         for name in ("imu", "newest", "batching"):
             self._queues[name] = state[name]
-        self._reserve(0, len(state["pending"]))
-        for event in state["pending"]:
-            append_pending(self._queues[event["row"]], self._pending, event)
 
     def due(self, samples: SampleBatch, anchors: int) -> Due:
         """Return what can be fused now.
@@ -90,12 +85,14 @@ class SampleQueue:
         Raises IndexError for a sample of a row that is not configured.
         """
         columns = (samples.imu, samples.headings, samples.ranges, samples.bearings, samples.pressures)
-        count = sum(map(len, columns))
-        self._reserve(count, count - len(samples.imu))
+        count = sum(map(len, columns)) + len(self._waiting)
+        if count > len(self._batch.events):
+            self._batch = _make_batch(2 * count)
         queues = self._queues[: self._rows]
-        ordered = order_samples(*columns, anchors, queues, self._pending, self._max_lag_ns, self._batch)
+        ordered = order_samples(*columns, anchors, queues, self._waiting, self._max_lag_ns, self._batch)
         if ordered == NONE:
             raise IndexError("a sample belongs to a row that is not configured: call configure for it first")
+        self._waiting = self._batch.waiting[: self._batch.counts[WAITING]].copy()
         rejected = self._batch.rejected[: self._batch.counts[REJECTED]]
         by_reason, by_kind = _rows_by(rejected, "reason", _REASON_OF), _rows_by(rejected, "kind", KINDS)
         return Due(self._batch.events, self._batch.order[:ordered], by_reason, by_kind, self._lags())
@@ -106,21 +103,6 @@ class SampleQueue:
         lag_ns, lags = self._queues["batching"]["lag"][rows], np.zeros(len(rows), LAG)
         lags["row"], lags["lag_ns"] = rows, np.where(lag_ns > 0, lag_ns + REORDER_WINDOW, 0)
         return lags
-
-    def _reserve(self, samples: int, measurements: int) -> None:
-        """Make room for this many samples, of which so many measurements may become pending."""
-        pending = self._pending.counts[0]
-        if pending + measurements >= len(self._pending.events):
-            self._pending = _enlarge(self._pending, 2 * (pending + measurements))
-        if samples + pending > len(self._batch.events):
-            self._batch = _make_batch(2 * (samples + pending))
-
-    def _pending_of(self, row: int) -> Array:
-        slots, slot = [], self._queues[row]["pending"]
-        while slot != NONE:
-            slots.append(slot)
-            slot = self._pending.following[slot]
-        return self._pending.events[slots]
 
 
 def _rows_by(rejected: Array, column: str, names: dict[int, str]) -> dict[str, Array]:
@@ -136,31 +118,11 @@ def _make_queues(rows: int) -> Array:
     queues = np.zeros(rows, ROW_QUEUE)
     queues["imu"] = queues["newest"] = NEVER
     queues["first"] = UNTOUCHED
-    queues["last"] = queues["pending"] = queues["pending_last"] = NONE
     return queues
-
-
-def _make_pending(slots: int) -> Pending:
-    following = np.arange(1, slots + 1, dtype=np.int32)
-    following[-1] = NONE
-    return Pending(np.zeros(slots, EVENT), following, np.zeros(1, np.int64))
-
-
-def _enlarge(pending: Pending, slots: int) -> Pending:
-    """Return the same slots in use, with more of them free."""
-    grown, size = _make_pending(slots), len(pending.events)
-    grown.events[:size] = pending.events
-    grown.following[:size] = pending.following
-    tail = 0
-    while grown.following[tail] != NONE:
-        tail = int(grown.following[tail])
-    grown.following[tail] = size
-    grown.counts[:] = pending.counts
-    return grown
 
 
 def _make_batch(samples: int) -> Batch:
     following, order, spare, touched = np.zeros((4, samples), np.int32)
     times = np.zeros(samples, np.int64)
-    events, rejected = np.zeros(samples, EVENT), np.zeros(samples, REJECTION)
-    return Batch(events, following, times, order, spare, touched, rejected, np.zeros(3, np.int64))
+    events, waiting, rejected = np.zeros(samples, EVENT), np.zeros(samples, EVENT), np.zeros(samples, REJECTION)
+    return Batch(events, waiting, following, times, order, spare, touched, rejected, np.zeros(4, np.int64))

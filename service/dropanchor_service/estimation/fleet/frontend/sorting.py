@@ -1,4 +1,4 @@
-"""One compiled pass that puts a batch's samples, and those that are pending, in order of row and time.
+"""One compiled pass that puts a batch's samples, and those that waited, in order of row and time.
 
 Every row that a batch touches gets a list of its samples, and what is due of it is sorted by time. A sample is an
 index: below the number of IMU samples it points into their column, above it into the batch's events. IMU samples never
@@ -7,43 +7,55 @@ takes an array out of a tuple.
 """
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeAlias
+
+import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.batching import REORDER_WINDOW, learn_lag
+from dropanchor_service.estimation.fleet.frontend.batching import BATCHING, REORDER_WINDOW, learn_lag
 from dropanchor_service.estimation.fleet.frontend.event import (
     ANCHOR_UNKNOWN,
     BEARING_EVENT,
     HEADING_EVENT,
     IMU_EVENT,
     LATE,
+    NONE,
     NOT_FINITE,
     PRESSURE_EVENT,
     RANGE_EVENT,
-    Event,
-)
-from dropanchor_service.estimation.fleet.frontend.pending import (
-    NONE,
     UNTOUCHED,
-    Pending,
-    RowQueue,
-    append_pending,
-    append_slot,
-    free_slot,
+    Event,
 )
 
 TOLERANCE: Final = 40_000_000  # ns by which the IMU may lag behind a measurement
 IMU_TIMEOUT: Final = 1_000_000_000  # ns without an IMU sample after which no measurement waits for one
 MAX_WAITING: Final = 1024  # events of a row: more than 3.5 s of four anchors at 50 Hz
 
-EVENTS, TOUCHED, REJECTED = range(3)  # indices of the counts of a batch
+EVENTS, TOUCHED, REJECTED, WAITING = range(4)  # indices of the counts of a batch
+
+
+ROW_QUEUE: Final = np.dtype(
+    [
+        ("imu", np.int64),  # ns, newest IMU sample of the row
+        ("newest", np.int64),  # ns, newest sample of the row
+        ("imu_next", np.int64),  # the same two with the samples of the present batch
+        ("newest_next", np.int64),
+        ("imu_oldest", np.int64),  # ns, first IMU sample of the present batch
+        ("batching", BATCHING),
+        ("first", np.int32),  # index of the row's first sample in the batch; UNTOUCHED: it has none
+        ("last", np.int32),
+        ("waiting", np.int32),  # number of its events that wait for its IMU
+    ]
+)
+RowQueue: TypeAlias = Any  # a record of ROW_QUEUE
 
 
 class Batch(NamedTuple):
-    """Buffers of one pass, with room for all samples and all pending events."""
+    """Buffers of one pass, with room for all samples and all events that waited."""
 
     events: Array  # EVENT
+    waiting: Array  # EVENT, those that go on waiting
     following: Array  # index of the next sample of the same row
     times: Array  # ns, of the samples
     order: Array  # the result: indices of samples
@@ -62,20 +74,21 @@ def order_samples(
     pressures: Array,
     anchors: int,
     queues: Array,
-    pending: Pending,
+    waiting: Array,
     max_lag: int,
     batch: Batch,
 ) -> int:
     """Fill batch.order and return how many samples are due.
 
-    max_lag: ns by which a row's measurements wait longer than REORDER_WINDOW, at most. Return NONE, with nothing
-    changed, where a sample belongs to a row that is not configured.
+    waiting: EVENT that earlier batches brought. max_lag: ns by which a row's measurements wait longer than
+    REORDER_WINDOW, at most. Return NONE, with nothing changed, where a sample belongs to a row that is not configured.
     """
     rows = len(queues)
     measured = _within(headings, rows) and _within(ranges, rows) and _within(bearings, rows)
     if not (_within(imu, rows) and measured and _within(pressures, rows)):
         return NONE
     batch.counts[:] = 0
+    _add_waiting(len(imu), waiting, queues, batch)
     _add_imu(imu, queues, batch.following, batch.times, batch.touched, batch)
     for k in range(len(headings)):
         sample = headings[k]
@@ -99,8 +112,7 @@ def order_samples(
         if queue.imu_next > queue.imu:
             learn_lag(queue.batching, queue.newest, queue.imu_oldest, queue.imu_next, max_lag)
         queue.imu, queue.newest = queue.imu_next, queue.newest_next
-        due = _release_pending(len(imu), queue, pending, batch, start)
-        due = _release_new(len(imu), queue, pending, batch.events, batch.following, batch.order, due)
+        due = _release(len(imu), len(waiting), queue, batch, start)
         _sort(batch, len(imu), start, due)
     return due
 
@@ -126,6 +138,19 @@ def _reject(row: int, reason: int, kind: int, batch: Batch) -> None:
     rejection = batch.rejected[batch.counts[REJECTED]]
     rejection.row, rejection.reason, rejection.kind = row, reason, kind
     batch.counts[REJECTED] += 1
+
+
+@njit(nogil=True)
+def _add_waiting(imu_count: int, waiting: Array, queues: Array, batch: Batch) -> None:
+    """Begin the lists of rows with what waited."""
+    for k in range(len(waiting)):
+        event = waiting[k]
+        queue = queues[event.row]
+        _open_list(queue, event.row, batch.touched, batch.counts)
+        batch.events[k] = event
+        queue.waiting += 1
+        _append_sample(queue, event.t_ns, imu_count + k, batch.following, batch.times)
+    batch.counts[EVENTS] = len(waiting)
 
 
 @njit(nogil=True)
@@ -175,6 +200,7 @@ def _open_list(queue: RowQueue, row: int, touched: Array, counts: Array) -> None
     """Note that the batch has samples of this row."""
     if queue.first == UNTOUCHED:
         queue.first = queue.last = NONE
+        queue.waiting = 0
         queue.imu_next, queue.newest_next = queue.imu, queue.newest
         touched[counts[TOUCHED]] = row
         counts[TOUCHED] += 1
@@ -202,40 +228,24 @@ def _is_due(queue: RowQueue, event: Event) -> bool:
 
 
 @njit(nogil=True)
-def _release_pending(imu_count: int, queue: RowQueue, pending: Pending, batch: Batch, start: int) -> int:
-    """Move the row's pending events that are due to batch.order, from `start` on. Return the end."""
-    slot, end = queue.pending, start
-    queue.pending = NONE
-    while slot != NONE:
-        following = pending.following[slot]
-        if _is_due(queue, pending.events[slot]):
-            index = batch.counts[EVENTS]
-            batch.counts[EVENTS] += 1
-            batch.events[index] = pending.events[slot]
-            batch.times[imu_count + index] = pending.events[slot].t_ns
-            batch.order[end] = imu_count + index
-            end += 1
-            queue.waiting -= 1
-            free_slot(pending, slot)
-        else:
-            append_slot(queue, pending, slot)
-        slot = following
-    return end
+def _release(imu_count: int, waited: int, queue: RowQueue, batch: Batch, start: int) -> int:
+    """Append the row's samples that are due to batch.order, from `start` on. The others wait. Return the end.
 
-
-@njit(nogil=True)
-def _release_new(
-    imu_count: int, queue: RowQueue, pending: Pending, events: Array, following: Array, order: Array, start: int
-) -> int:
-    """Append the row's new samples that are due to `order`, from `start` on. The others become pending."""
+    waited: how many of the events, the first ones, have waited before.
+    """
     index, end = queue.first, start
     queue.first = UNTOUCHED
+    events, following, order = batch.events, batch.following, batch.order
     while index != NONE:
+        has_waited = imu_count <= index < imu_count + waited
         if index < imu_count or _is_due(queue, events[index - imu_count]):
             order[end] = index
             end += 1
+            queue.waiting -= has_waited
         else:
-            append_pending(queue, pending, events[index - imu_count])
+            batch.waiting[batch.counts[WAITING]] = events[index - imu_count]
+            batch.counts[WAITING] += 1
+            queue.waiting += not has_waited
         index = following[index]
     return end
 
