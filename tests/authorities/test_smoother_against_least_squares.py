@@ -7,7 +7,7 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import default_settings
 from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, RANGE_BIAS, ROW, N, R, V
-from dropanchor_service.estimation.fleet.belief.workspace import WORKING_HYPOTHESIS
+from dropanchor_service.estimation.fleet.belief.workspace import WORKING_HYPOTHESIS, make_workspace
 from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.frontend.node import NODE, RANGE
 from dropanchor_service.estimation.fleet.smoother.back import predict_moments, set_row, step_back
@@ -17,6 +17,7 @@ from support.fleet_runs import traced
 from support.fleet_tracks import CALIBRATED
 
 RADIAL = [R, V, ACC_BIAS, RANGE_BIAS]
+SCRATCH = make_workspace()[0]["scratch"]
 RANGE_STD, Q_RANGE_BIAS = 0.1, 1e-5  # m, m^2/s
 PRIOR = ([10.0, 1.0, 0.0, 0.0], [0.04, 0.09, 0.01, 0.02])
 
@@ -72,7 +73,7 @@ def stepped_back(nodes: Any, kept: Any, traces: Any, rows: Any, t: Tuning) -> tu
     for k in range(len(nodes) - 2, -1, -1):
         mean[k], cov[k] = mean[k + 1], cov[k + 1]
         set_row(rows[0], traces[k], traces[k + 1])
-        moments = predict_moments(kept[k], kept[k + 1], nodes[k + 1], rows[0], traces[k + 1], False, t)
+        moments = predict_moments(kept[k], kept[k + 1], nodes[k + 1], rows[0], traces[k + 1], False, t, SCRATCH)
         assert step_back(mean[k], cov[k], kept[k], *moments)
     return mean, cov
 
@@ -115,14 +116,16 @@ def test_one_step_over_a_turn_equals_the_textbook_recursion_with_a_jacobian_by_d
     for k in (200, 230, 260):
         one, node = run.hypotheses[run.traces[k]["first"]], run.nodes[k + 1]
         set_row(row[0], run.traces[k], run.traces[k + 1])
-        s, P, C = predict_moments(one, one, node, row[0], run.traces[k + 1], False, CALIBRATED)
+        s, P, C = predict_moments(one, one, node, row[0], run.traces[k + 1], False, CALIBRATED, SCRATCH)
         A = np.zeros((N, N))
         for i in range(N):
             ends = []
             for step in (1e-5, -1e-5):
                 moved = run.hypotheses[run.traces[k]["first"] : run.traces[k]["first"] + 1].copy()[0]
                 moved["mean"][i] += step
-                ends.append(predict_moments(moved, moved, node, row[0], run.traces[k + 1], False, CALIBRATED)[0])
+                ends.append(
+                    predict_moments(moved, moved, node, row[0], run.traces[k + 1], False, CALIBRATED, SCRATCH)[0]
+                )
             A[:, i] = (ends[0] - ends[1]) / 2e-5
         # What an error of the gyroscope's bias turns of the two biases is left out of C.
         assert np.allclose(C, one["cov"] @ A.T, rtol=1e-4, atol=1e-5)

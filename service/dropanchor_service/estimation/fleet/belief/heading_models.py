@@ -105,14 +105,11 @@ def reset_models(row: Row, heading: float, variance: float) -> None:
     """Start both models at this heading, rad."""
     for m in range(MODELS):
         white, slow, _ = model_parameters(m, variance)
-        row.heading.model_mean[m, 0], row.heading.model_mean[m, 1], row.heading.model_mean[m, 2] = heading, 0.0, 0.0
-        for i in range(3):
-            for j in range(3):
-                row.heading.model_cov[m, i, j] = 0.0
-        row.heading.model_cov[m, 0, 0] = white + slow * slow
-        row.heading.model_cov[m, 1, 1] = BIAS_SD**2
-        row.heading.model_cov[m, 2, 2] = slow * slow
-        row.heading.model_cov[m, 0, 2] = row.heading.model_cov[m, 2, 0] = -slow * slow
+        s, P = row.heading.model_mean[m], row.heading.model_cov[m]
+        s[:] = heading, 0.0, 0.0
+        P[:] = 0.0
+        P[0, 0], P[1, 1], P[2, 2] = white + slow * slow, BIAS_SD**2, slow * slow
+        P[0, 2] = P[2, 0] = -slow * slow
         row.heading.model_log_likelihood[m] = 0.0
     row.heading.models_started = 1
     row.heading.model = 0
@@ -126,7 +123,8 @@ def predict_models(row: Row, node: Node, variance: float, t: Tuning) -> None:
         _, slow, tau = model_parameters(m, variance)
         s, P = row.heading.model_mean[m], row.heading.model_cov[m]
         if node.rest == RESTING and dt > 0.0:
-            _update_component(s, P, 1, node.dyaw / dt - s[1], node.dyaw_var / dt**2 + t.rest_gyro_std**2)
+            S = P[1, 1] + node.dyaw_var / dt**2 + t.rest_gyro_std**2
+            _apply_gain(s, P, P[0, 1] / S, P[1, 1] / S, P[2, 1] / S, node.dyaw / dt - s[1], S)
         decay = math.exp(-dt / tau)
         s[0] += node.dyaw - s[1] * dt
         s[2] *= decay
@@ -137,13 +135,6 @@ def predict_models(row: Row, node: Node, variance: float, t: Tuning) -> None:
         P[2, 2] = P[2, 2] * decay * decay + slow * slow * (1.0 - decay * decay)
         P[1, 1] += BIAS_WALK * dt
         P[1, 0], P[2, 0], P[2, 1] = P[0, 1], P[0, 2], P[1, 2]
-
-
-@njit(nogil=True)
-def _update_component(s: Floats, P: Floats, k: int, e: float, variance: float) -> None:
-    S = P[k, k] + variance
-    k0, k1, k2 = P[0, k] / S, P[1, k] / S, P[2, k] / S
-    _apply_gain(s, P, k0, k1, k2, e, S)
 
 
 @njit(nogil=True)

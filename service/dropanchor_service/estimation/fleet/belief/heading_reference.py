@@ -15,6 +15,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     N,
     Row,
 )
+from dropanchor_service.estimation.fleet.belief.mixture import clear_state
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import MEASURED_HEADING, Node
 
@@ -62,8 +63,7 @@ def turn_to_yaw(P: Floats) -> None:
         P[PHI, i] -= P[YAW, i]
     for i in range(N):
         P[i, PHI] -= P[i, YAW]
-    for i in range(N):
-        P[YAW, i] = P[i, YAW] = 0.0
+    clear_state(P, YAW, 0.0)
 
 
 @njit(nogil=True)
@@ -77,9 +77,8 @@ def adopt_reference(P: Floats, variance: float) -> None:
         P[MOUNT, i] += P[YAW, i]
     for i in range(N):
         P[i, MOUNT] += P[i, YAW]
-    for i in range(N):
-        P[YAW, i] = P[i, YAW] = P[REFERENCE, i] = P[i, REFERENCE] = 0.0
-    P[YAW, YAW] = P[REFERENCE, REFERENCE] = variance
+    clear_state(P, YAW, variance)
+    clear_state(P, REFERENCE, variance)
     P[YAW, REFERENCE] = P[REFERENCE, YAW] = -variance
     for i in range(N):
         P[MOUNT, i] -= P[YAW, i]
@@ -107,7 +106,6 @@ def restart_reference(one: Hypothesis, row: Row, yaw: float, variance: float) ->
     s, P = one.mean, one.cov
     one.heading_class = EXACT
     s[YAW], s[REFERENCE] = wrap(yaw), 0.0
-    for i in range(N):
-        P[YAW, i] = P[i, YAW] = P[REFERENCE, i] = P[i, REFERENCE] = 0.0
-    P[YAW, YAW] = variance
+    clear_state(P, YAW, variance)
+    clear_state(P, REFERENCE, 0.0)
     forget(row, REFERENCE_ERROR)

@@ -95,6 +95,14 @@ def keep_heaviest(work: Hypotheses, count: int, most: int) -> int:
 
 
 @njit(nogil=True)
+def clear_state(P: Floats, i: int, variance: float) -> None:
+    """Make a state one that is known with this variance, independently of the others."""
+    for j in range(N):
+        P[i, j] = P[j, i] = 0.0
+    P[i, i] = variance
+
+
+@njit(nogil=True)
 def gets_child(work: Hypotheses, h: int, count: int, top: float, depth: float) -> bool:
     """Return whether a birth gives hypothesis h a child: there is room, and it is not too light for it.
 

@@ -32,6 +32,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     N,
     R,
     Row,
+    Scratch,
     V,
 )
 from dropanchor_service.estimation.fleet.belief.rigidity import slip_std_of
@@ -49,26 +50,16 @@ def is_empty(node: Node) -> bool:
 
 @njit(nogil=True, borrows=True)
 def predict(
-    s: Floats,
-    P: Floats,
-    decay: Floats,
-    growth: Floats,
-    F: Floats,
-    A: Floats,
-    node: Node,
-    row: Row,
-    t: Tuning,
-    nlos: int,
-    bends: bool,
-    rigid: bool,
+    s: Floats, P: Floats, scratch: Scratch, node: Node, row: Row, t: Tuning, nlos: int, bends: bool, rigid: bool
 ) -> None:
     """Predict a state and its covariance over the node: the one motion model of the filter and of the smoother.
 
-    decay, growth: from `fill_noise` and `fill_class_noise`. F and A (4, N) are scratch. bends: of `bends_tilt`.
+    scratch: with what `fill_noise` and `fill_class_noise` fill. bends: of `bends_tilt`.
     """
-    predict_state(s, node, decay, F)
-    predict_covariance(P, F, decay, A)
-    add_process_noise(s, P, F, growth, node, row, t, nlos)
+    F = scratch.F
+    predict_state(s, node, scratch.decay, F)
+    predict_covariance(P, F, scratch.decay, scratch.FP)
+    add_process_noise(s, P, F, scratch.growth, node, row, t, nlos)
     if bends:
         follow_tilt(s, P, node, rigid, t)
 

@@ -84,7 +84,7 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
     """
     if is_empty(node):
         return
-    decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
+    decay, growth = scratch.decay, scratch.growth
     follow_sliding(work[best_of(work, count)], scratch, node, row, t)
     lateral, slip_std = follow_mount(work, count, row, node, t, scratch), slip_std_of(row)
     rigid = slip_std <= RIGID_SLIP
@@ -98,7 +98,7 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
                 if not filled:
                     fill_class_noise(decay, growth, node, row, heading_class, t)
                     filled = True
-                predict(work[h].mean, work[h].cov, decay, growth, F, FP, node, row, t, work[h].nlos, bends, rigid)
+                predict(work[h].mean, work[h].cov, scratch, node, row, t, work[h].nlos, bends, rigid)
                 if lateral:
                     update_lateral(work[h], scratch, node, row, slip_std, power)
 

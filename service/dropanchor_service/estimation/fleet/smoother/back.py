@@ -36,6 +36,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     N,
     R,
     Row,
+    Scratch,
 )
 from dropanchor_service.estimation.fleet.belief.predict import (
     fill_class_noise,
@@ -64,10 +65,10 @@ def set_row(row: Row, before: Trace, after: Trace) -> None:
 
 
 @njit(nogil=True)
-def predict_mean(s: Floats, node: Node, decay: Floats, F: Floats, enters: bool) -> None:
+def predict_mean(s: Floats, node: Node, scratch: Scratch, enters: bool) -> None:
     """Predict the state s. enters: the node's heading turned the belief into the site frame."""
     if not is_empty(node):
-        predict_state(s, node, decay, F)
+        predict_state(s, node, scratch.decay, scratch.F)
     if enters:
         s[PHI] += node.heading - s[YAW]
         s[YAW] = node.heading
@@ -75,18 +76,18 @@ def predict_mean(s: Floats, node: Node, decay: Floats, F: Floats, enters: bool) 
 
 @njit(nogil=True, cache=True)
 def predict_moments(
-    one: Hypothesis, child: Hypothesis, node: Node, row: Row, after: Trace, enters: bool, t: Tuning
+    one: Hypothesis, child: Hypothesis, node: Node, row: Row, after: Trace, enters: bool, t: Tuning, scratch: Scratch
 ) -> tuple[Floats, Floats, Floats]:
     """Return the predicted mean and covariance of a hypothesis, and its covariance with its prediction."""
-    decay, growth, F, A = np.ones(N), np.zeros(N), np.zeros((4, N)), np.zeros((4, N))
+    decay, growth = scratch.decay, scratch.growth
     s, P, C = one.mean.copy(), one.cov.copy(), one.cov.copy()
     if not is_empty(node):
         rigid = slip_std_of(row) <= RIGID_SLIP
         bends = bends_tilt(node, rigid)
         fill_noise(decay, growth, node, row, t)
         fill_class_noise(decay, growth, node, row, one.heading_class, t)
-        predict(s, P, decay, growth, F, A, node, row, t, one.nlos, False, rigid)
-        _cross(one.cov, F, decay, C)
+        predict(s, P, scratch, node, row, t, one.nlos, False, rigid)
+        _cross(one.cov, scratch.F, decay, C)
         if bends and rigid:
             turn_columns(C, s, node)
         if bends:

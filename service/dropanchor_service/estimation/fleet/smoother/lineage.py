@@ -22,10 +22,10 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Floats,
     Hypotheses,
     Hypothesis,
-    N,
     R,
     Row,
     Rows,
+    Scratch,
     V,
     Workspace,
 )
@@ -102,21 +102,14 @@ def distance(s: Floats, P: Floats, target: Floats) -> float:
 
 @njit(nogil=True)
 def _predecessor(
-    child: Hypothesis,
-    node: Node,
-    before: Trace,
-    hypotheses: Hypotheses,
-    decay: Floats,
-    F: Floats,
-    s: Floats,
-    enters: bool,
+    child: Hypothesis, node: Node, before: Trace, hypotheses: Hypotheses, scratch: Scratch, enters: bool
 ) -> int:
     """Return the hypothesis before the node that is the likeliest one before `child`."""
-    chosen, least = -1, math.inf
+    chosen, least, s = -1, math.inf, scratch.H
     for h in range(before.first, before.first + before.count):
         one = hypotheses[h]
         s[:] = one.mean
-        predict_mean(s, node, decay, F, enters)
+        predict_mean(s, node, scratch, enters)
         d2 = distance(s, one.cov, child.mean) - 2.0 * one.log_weight
         if one.heading_class != child.heading_class:
             d2 += OTHER_CLASS
@@ -129,33 +122,33 @@ def _predecessor(
 
 @njit(nogil=True)
 def _step(
-    work: Hypotheses,
+    space: Workspace,
     source: Indices,
     n: int,
-    node: Node,
-    before: Trace,
-    after: Trace,
-    hypotheses: Hypotheses,
+    k: int,
+    nodes: Nodes,
+    traces: Array,
+    known: Hypotheses,
     row: Row,
     t: Tuning,
 ) -> bool:
-    """Step all that is followed back over a node. Return whether most of its weight continues what was before."""
+    """Step all that is followed back over node k + 1. Return whether most of its weight continues what was before."""
+    node, before, after = nodes[k + 1], traces[k], traces[k + 1]
     enters = before.referred == 0 and after.referred == 1
     if before.count == 0 or before.carried != after.carried or before.referred > after.referred:
         return False
     if enters and not is_in_site_frame(node.heading_kind):
         return False
+    work, scratch = space.hypotheses, space.scratch
     set_row(row, before, after)
-    decay, growth, F, s = np.ones(N), np.zeros(N), np.zeros((4, N)), np.zeros(N)
-    fill_noise(decay, growth, node, row, t)
     left = 0.0
     for j in range(n):
         if work[j].log_weight == -math.inf:
             continue
-        child = hypotheses[source[j]]
-        parent = _predecessor(child, node, before, hypotheses, decay, F, s, enters)
-        one = hypotheses[parent]
-        mean, P, C = predict_moments(one, child, node, row, after, enters, t)
+        fill_noise(scratch.decay, scratch.growth, node, row, t)
+        parent = _predecessor(known[source[j]], node, before, known, scratch, enters)
+        one = known[parent]
+        mean, P, C = predict_moments(one, known[source[j]], node, row, after, enters, t, scratch)
         if step_back(work[j].mean, work[j].cov, one, mean, P, C):
             source[j] = parent
             left += math.exp(work[j].log_weight)
@@ -215,7 +208,7 @@ def smooth_back(
     space, source = workspace[0], np.zeros(FOLLOWED, np.int64)  # of the filter's hypothesis at the node
     work, n, ends = space.hypotheses, 0, end
     for k in range(end, a - 1, -1):
-        if n == 0 or not _step(work, source, n, nodes[k + 1], traces[k], traces[k + 1], hypotheses, rows[0], t):
+        if n == 0 or not _step(space, source, n, k, nodes, traces, hypotheses, rows[0], t):
             x, y, ends = published[k, 0], published[k, 1], k
             n = _begin(work, source, traces[k], hypotheses, x, y, t) if trusted[k] else 0
         if k < b and n > 0:

@@ -27,12 +27,11 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Floats,
     Hypotheses,
     Hypothesis,
-    N,
     R,
     Row,
     V,
 )
-from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis, gets_child
+from dropanchor_service.estimation.fleet.belief.mixture import best_of, clear_state, copy_hypothesis, gets_child
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import MEASURED_HEADING, Node
 from dropanchor_service.estimation.fleet.measurement.scalar import gaussian
@@ -46,20 +45,15 @@ MOUNT_KNOWN: Final = 0.3  # rad, of a mounting angle that the operator knows
 
 
 @njit(nogil=True)
-def note_origin(row: Row, var: float) -> None:
-    """Note where the tag is before its first steps. var: m^2."""
-    row.walk.x, row.walk.y, row.walk.var = row.publication.x, row.publication.y, var
-
-
-@njit(nogil=True)
 def follow_motion(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> int:
     """Make the hypotheses those of what moves the tag now. Return their count."""
     if node.carried == 0 or not is_on(PICK_UP, t):
         node.carried = row.walk.carried
     if row.walk.carried == node.carried:
         if node.carried == 0 and (node.walked == 0.0 or row.walk.var == 0.0):
-            P = work[best_of(work, count)].cov
-            note_origin(row, P[R, R] + work[best_of(work, count)].mean[R] ** 2 * P[PHI, PHI])
+            s, P = work[best_of(work, count)].mean, work[best_of(work, count)].cov
+            row.walk.x, row.walk.y = row.publication.x, row.publication.y  # before its first steps
+            row.walk.var = P[R, R] + s[R] ** 2 * P[PHI, PHI]
         return count
     if node.carried == 1 and _is_too_fast(work[best_of(work, count)], t):
         node.carried = 0
@@ -110,24 +104,17 @@ def _is_too_fast(one: Hypothesis, t: Tuning) -> bool:
 
 
 @njit(nogil=True)
-def _clear(P: Floats, i: int, variance: float) -> None:
-    for j in range(N):
-        P[i, j] = P[j, i] = 0.0
-    P[i, i] = variance
-
-
-@njit(nogil=True)
 def _become_carried(one: Hypothesis, row: Row, node: Node, t: Tuning) -> None:
     """Replace what a vehicle's hypothesis says of speed, slip and accelerometer."""
     s, P = one.mean, one.cov
     one.reverse = one.aligned = 0
     for i in (V, SLIP, GAIT_OFFSET, STEP_SCALE, GYRO_BIAS):
         s[i] = 0.0
-    _clear(P, V, t.walk_speed_std**2)
-    _clear(P, SLIP, t.sway_std**2)
-    _clear(P, GAIT_OFFSET, ANY_DIRECTION_VAR if is_of_another_axis(row, node) else t.gait_offset_std**2)
-    _clear(P, STEP_SCALE, t.step_scale_std**2)
-    _clear(P, GYRO_BIAS, t.walk_gyro_bias_std**2)  # a rest in the hand, or shaking, may have taught a wrong one
+    clear_state(P, V, t.walk_speed_std**2)
+    clear_state(P, SLIP, t.sway_std**2)
+    clear_state(P, GAIT_OFFSET, ANY_DIRECTION_VAR if is_of_another_axis(row, node) else t.gait_offset_std**2)
+    clear_state(P, STEP_SCALE, t.step_scale_std**2)
+    clear_state(P, GYRO_BIAS, t.walk_gyro_bias_std**2)  # a rest in the hand, or shaking, may have taught a wrong one
     s[V] = USUAL_SPEED if node.walked > 0.0 else 0.0
 
 
@@ -159,7 +146,7 @@ def _pick_up(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> i
     cells = 1 if known else t.grips
     cell = TWO_PI / t.grips
     if not known:
-        _clear(one.cov, MOUNT, (cell / 2.0) ** 2)
+        clear_state(one.cov, MOUNT, (cell / 2.0) ** 2)
     for h in range(cells - 1, -1, -1):
         copy_hypothesis(work, 0, h)
         one = work[h]
@@ -178,7 +165,7 @@ def _see_again(one: Hypothesis, row: Row) -> None:
     if one.nlos == 1:
         one.nlos = 0
         one.mean[RANGE_BIAS] = one.los_bias
-        _clear(one.cov, RANGE_BIAS, one.los_bias_var)
+        clear_state(one.cov, RANGE_BIAS, one.los_bias_var)
     forget(row, SIGHT)
 
 
@@ -190,8 +177,8 @@ def _walk_from_origin(one: Hypothesis, row: Row, node: Node, t: Tuning) -> None:
     x, y = walk.x + node.walked * math.cos(course), walk.y + node.walked * math.sin(course)
     variance = walk.var + t.walk_start_var + (t.walk_start_share * node.walked) ** 2
     s[R], s[PHI] = max(math.hypot(x, y), 0.1), math.atan2(y, x)
-    _clear(P, R, variance)
-    _clear(P, PHI, variance / s[R] ** 2)
+    clear_state(P, R, variance)
+    clear_state(P, PHI, variance / s[R] ** 2)
 
 
 @njit(nogil=True)

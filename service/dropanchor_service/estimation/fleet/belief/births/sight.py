@@ -18,14 +18,12 @@ from dropanchor_service.estimation.fleet.belief.births.numbers import (
 from dropanchor_service.estimation.fleet.belief.layout import (
     PHI,
     RANGE_BIAS,
-    Floats,
     Hypotheses,
-    N,
     R,
     Row,
     V,
 )
-from dropanchor_service.estimation.fleet.belief.mixture import LIGHT, best_of, copy_hypothesis, gets_child
+from dropanchor_service.estimation.fleet.belief.mixture import LIGHT, best_of, clear_state, copy_hypothesis, gets_child
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import Node
 from dropanchor_service.estimation.fleet.tuning import Tuning, is_on
@@ -62,9 +60,8 @@ def copy_nlos(work: Hypotheses, source: int, target: int, t: Tuning) -> None:
     if new.nlos == 0:
         new.los_bias, new.los_bias_var = new.mean[RANGE_BIAS], new.cov[RANGE_BIAS, RANGE_BIAS]
         new.nlos = 1
-    _decorrelate_bias(new.cov)
     new.mean[RANGE_BIAS] = new.los_bias + t.outlier_mean
-    new.cov[RANGE_BIAS, RANGE_BIAS] = new.los_bias_var + t.outlier_std**2
+    clear_state(new.cov, RANGE_BIAS, new.los_bias_var + t.outlier_std**2)
     new.log_weight += t.nlos_log_prior
 
 
@@ -74,16 +71,9 @@ def copy_los(work: Hypotheses, source: int, target: int, t: Tuning) -> None:
     copy_hypothesis(work, source, target)
     new = work[target]
     new.nlos = 0
-    _decorrelate_bias(new.cov)
     new.mean[RANGE_BIAS] = new.los_bias
-    new.cov[RANGE_BIAS, RANGE_BIAS] = new.los_bias_var
+    clear_state(new.cov, RANGE_BIAS, new.los_bias_var)
     new.log_weight += t.nlos_log_prior
-
-
-@njit(nogil=True)
-def _decorrelate_bias(P: Floats) -> None:
-    for i in range(N):
-        P[RANGE_BIAS, i] = P[i, RANGE_BIAS] = 0.0
 
 
 @njit(nogil=True)
