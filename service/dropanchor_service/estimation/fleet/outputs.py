@@ -7,7 +7,6 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, Array, MeasurementKind
 from dropanchor_service.estimation.fleet.belief.layout import Anchors, Beliefs, Pool, Rows
-from dropanchor_service.estimation.fleet.belief.parts import PARTS
 from dropanchor_service.estimation.fleet.belief.publish import list_modes
 from dropanchor_service.estimation.fleet.belief.states import AMBIGUOUS
 from dropanchor_service.estimation.fleet.compiled import njit
@@ -90,8 +89,10 @@ def with_rows(by_kind: dict[str, Array], kind: str, rejected: dict[str, Array]) 
 
 def modes_of(nodes: Array, beliefs: Array, rows: Array, pool: Array, anchors: Array, workspace: Array) -> Array:
     """Return HYPOTHESIS: the modes of each row that its last node left ambiguous. A row's nodes are together."""
-    modes = np.zeros(MODES * _count_ambiguous(nodes, beliefs), HYPOTHESIS)
-    return modes[: _write_modes(nodes, beliefs, rows, pool, anchors, workspace, modes)]
+    last = np.append(nodes["row"][1:] != nodes["row"][:-1], True)
+    ambiguous = nodes["row"][(beliefs["state"] == AMBIGUOUS) & last] if len(nodes) else nodes["row"]
+    modes = np.zeros(MODES * len(ambiguous), HYPOTHESIS)
+    return modes[: _write_modes(ambiguous, rows, pool, anchors, workspace, modes)] if len(ambiguous) else modes
 
 
 @njit(cache=True, nogil=True)
@@ -107,19 +108,15 @@ def _write_poses(nodes: Nodes, beliefs: Beliefs, poses: Array) -> int:
         pose.frame = belief.relative
         pose.z, pose.z_std, pose.z_source = belief.z, belief.z_std, node.height_source
         pose.state, pose.reason, pose.yaw_rate = belief.state, belief.reason, belief.yaw_rate
-        known = belief.hypotheses > 0
-        pose.x = belief.x if known else np.nan
-        pose.y = belief.y if known else np.nan
-        pose.heading = belief.course if known else np.nan
-        pose.speed = belief.speed if known else np.nan
-        pose.p_mode = belief.p_mode if known else np.nan
-        pose.sigma_pos = belief.sigma_pos if known else np.nan
-        pose.sigma_obs = belief.sigma_obs if known else np.nan
-        for i in range(PARTS):
-            pose.parts[i] = belief.parts[i] if known else np.nan
-        for i in range(3):
-            for j in range(3):
-                pose.cov[i, j] = belief.cov[i, j] if known else np.nan
+        if belief.hypotheses == 0:
+            pose.x = pose.y = pose.heading = pose.speed = pose.p_mode = pose.sigma_pos = pose.sigma_obs = np.nan
+            pose.cov[:] = np.nan
+            pose.parts[:] = np.nan
+            continue
+        pose.x, pose.y, pose.heading, pose.speed = belief.x, belief.y, belief.course, belief.speed
+        pose.p_mode, pose.sigma_pos, pose.sigma_obs = belief.p_mode, belief.sigma_pos, belief.sigma_obs
+        pose.cov[:] = belief.cov
+        pose.parts[:] = belief.parts
     return n
 
 
@@ -154,30 +151,12 @@ def _write_innovations(nodes: Nodes, beliefs: Beliefs, records: Array) -> int:
     return n
 
 
-@njit(nogil=True)
-def _left_ambiguous(nodes: Nodes, beliefs: Beliefs, k: int) -> bool:
-    last = k + 1 == len(nodes) or nodes[k + 1].row != nodes[k].row
-    return bool(last and beliefs[k].state == AMBIGUOUS)
-
-
 @njit(cache=True, nogil=True)
-def _count_ambiguous(nodes: Nodes, beliefs: Beliefs) -> int:
-    count = 0
-    for k in range(len(nodes)):
-        count += _left_ambiguous(nodes, beliefs, k)
-    return count
-
-
-@njit(cache=True, nogil=True)
-def _write_modes(
-    nodes: Nodes, beliefs: Beliefs, rows: Rows, pool: Pool, anchors: Anchors, workspace: Rows, modes: Array
-) -> int:
+def _write_modes(numbers: Array, rows: Rows, pool: Pool, anchors: Anchors, workspace: Rows, modes: Array) -> int:
     n = 0
-    for k in range(len(nodes)):
-        if _left_ambiguous(nodes, beliefs, k):
-            row = nodes[k].row
-            found = list_modes(rows[row], pool, anchors, workspace[0], modes[n : n + MODES])
-            for mode in range(n, n + found):
-                modes[mode].row = row
-            n += found
+    for row in numbers:
+        found = list_modes(rows[row], pool, anchors, workspace[0], modes[n : n + MODES])
+        for mode in range(n, n + found):
+            modes[mode].row = row
+        n += found
     return n

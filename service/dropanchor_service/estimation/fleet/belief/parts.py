@@ -8,7 +8,6 @@ after a start somewhere on a ring.
 """
 
 import math
-from typing import Final
 
 from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.belief.layout import (
@@ -28,7 +27,6 @@ from dropanchor_service.estimation.fleet.belief.layout import (
 from dropanchor_service.estimation.fleet.compiled import njit
 
 NORTH, MOUNTING, SPEED, BEARING, RANGES, HEIGHT = range(6)  # of the parts; the first four are the order of C
-PARTS: Final = 6
 
 
 @njit(nogil=True)
