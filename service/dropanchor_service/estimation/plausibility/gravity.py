@@ -27,17 +27,7 @@ LEAST_TURNING: Final = 0.6  # rad²/s
 LEAST_SPEED: Final = 0.3  # m/s
 FORGET_S: Final = 60.0
 
-ACC_IN_G, ACC_IN_MG, ACC_SCALE, ACC_NO_GRAVITY = (
-    int(ImuVerdict.ACC_IN_G),
-    int(ImuVerdict.ACC_IN_MG),
-    int(ImuVerdict.ACC_SCALE),
-    int(ImuVerdict.ACC_NO_GRAVITY),
-)
-ACC_SILENT, ACC_STUCK, ACC_REVERSED = (
-    int(ImuVerdict.ACC_SILENT),
-    int(ImuVerdict.ACC_STUCK),
-    int(ImuVerdict.ACC_REVERSED),
-)
+ACC_IN_G, ACC_IN_MG, ACC_SCALE, ACC_NO_GRAVITY, ACC_SILENT, ACC_STUCK, ACC_REVERSED = map(int, list(ImuVerdict)[1:8])
 UPSIDE_DOWN = int(ImuVerdict.UPSIDE_DOWN)
 
 

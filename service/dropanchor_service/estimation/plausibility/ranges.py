@@ -40,12 +40,7 @@ OFTEN, SELDOM = 0.45, 0.1
 ABSURD_MEMORY: Final = 0.05
 ABSURD, NOT_ABSURD = 0.3, 0.05
 
-GOOD, IN_MM, IN_CM, AVERAGED = (
-    int(RangeVerdict.GOOD),
-    int(RangeVerdict.IN_MM),
-    int(RangeVerdict.IN_CM),
-    int(RangeVerdict.AVERAGED),
-)
+GOOD, IN_MM, IN_CM, AVERAGED = map(int, RangeVerdict)
 
 
 @njit(nogil=True)

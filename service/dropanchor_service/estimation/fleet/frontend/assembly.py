@@ -1,5 +1,14 @@
-"""One compiled pass that turns ordered samples of many rows into nodes."""
+"""One compiled pass that turns ordered samples of many rows into nodes.
 
+A tag on a mast, or held out in front, is a lever (x, y), body frame, away from the pivot (a rear axle, a person's feet)
+that moves along the course, and swings about it when that turns. With w the rate and R(a) a turn by a, over a node:
+
+    swing = (R(dyaw) - I) lever,   dv of the pivot = dv of the tag - (R(dyaw) w x lever at the end - w x lever before).
+
+Rates are means over a node. The state is the place of the tag and the speed of the pivot.
+"""
+
+import math
 from typing import Any, Final
 
 import numpy as np
@@ -9,7 +18,6 @@ from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.event import HEADING_EVENT, PRESSURE_EVENT, Event
 from dropanchor_service.estimation.fleet.frontend.height import add_pressure, height_at
 from dropanchor_service.estimation.fleet.frontend.inertial import add_sample, close_node
-from dropanchor_service.estimation.fleet.frontend.lever import apply_lever
 from dropanchor_service.estimation.fleet.frontend.node import NO_HEADING, RANGE, Node, Nodes
 from dropanchor_service.estimation.fleet.frontend.platform import (
     Platform,
@@ -42,6 +50,23 @@ def _close(front: Frontend, platform: Platform, row: Any, t_ns: int, node: Node)
         fill_platform_node(platform, newest, node)
         node.t_ns = newest
     apply_lever(row, node)
+
+
+@njit(nogil=True)
+def apply_lever(row: Any, node: Node) -> None:
+    """Fill the node's swing, and turn its dv into that of the pivot."""
+    x, y = row.settings.lever_x, row.settings.lever_y
+    if x == 0.0 and y == 0.0:
+        return
+    c, s = math.cos(node.dyaw), math.sin(node.dyaw)
+    node.swing_forward = (c - 1.0) * x - s * y
+    node.swing_left = s * x + (c - 1.0) * y
+    before = row.lever_rate
+    if node.dt_s > 0.0:
+        row.lever_rate = node.dyaw / node.dt_s
+    after = row.lever_rate
+    node.dv_forward -= -after * (c * y + s * x) + before * y
+    node.dv_left -= after * (c * x - s * y) - before * x
 
 
 @njit(nogil=True)

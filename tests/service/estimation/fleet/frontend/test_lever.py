@@ -8,7 +8,7 @@ import numpy as np
 from dropanchor_service.estimation.columns import ANCHOR, IMU, RANGE, Array, SampleBatch, default_settings
 from dropanchor_service.estimation.fleet.belief.layout import ROW
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.estimation.fleet.frontend.lever import apply_lever
+from dropanchor_service.estimation.fleet.frontend.assembly import apply_lever
 from dropanchor_service.estimation.fleet.frontend.node import NODE
 
 G0 = 9.80665
