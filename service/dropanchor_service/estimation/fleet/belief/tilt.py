@@ -76,40 +76,28 @@ def follow_tilt(s: Floats, P: Floats, node: Node, rigid: bool, t: Tuning) -> Non
 @njit(nogil=True)
 def predict_tilt(s: Floats, P: Floats, node: Node) -> None:
     """Predict the biases of a rigid mount, and their covariance, in a state that was predicted over the node."""
-    w = node.dyaw - s[GYRO_BIAS] * node.dt_s
-    share = node.tilt_gain / node.dt_s
-    along, across = increments(node, s[MOUNT] + s[SLIP] + w / 2)
-    by_bias, by_course = 1.0 + min(node.tilt_gain, node.dt_s / TAU), -share * across
-    by_speed, by_gyro = -share * w, node.tilt_gain * s[V]
+    w, share = node.dyaw - s[GYRO_BIAS] * node.dt_s, node.tilt_gain / node.dt_s
+    along, _ = increments(node, s[MOUNT] + s[SLIP] + w / 2)
     c, n = math.cos(w), math.sin(w)
-    a, b = by_bias * s[ACC_BIAS] - share * along, s[LEFT_BIAS] - share * w * s[V]
+    a = (1.0 + min(node.tilt_gain, node.dt_s / TAU)) * s[ACC_BIAS] - share * along
+    b = s[LEFT_BIAS] - share * w * s[V]
     s[ACC_BIAS], s[LEFT_BIAS] = c * a + n * b, c * b - n * a
-    for i in range(N):
-        turned = P[i, MOUNT] + P[i, SLIP] - P[i, GYRO_BIAS] * node.dt_s / 2
-        a = by_bias * P[i, ACC_BIAS] + by_course * turned
-        b = P[i, LEFT_BIAS] + by_speed * P[i, V] + by_gyro * P[i, GYRO_BIAS]
-        P[i, ACC_BIAS], P[i, LEFT_BIAS] = c * a + n * b, c * b - n * a
-    for i in range(N):
-        turned = P[MOUNT, i] + P[SLIP, i] - P[GYRO_BIAS, i] * node.dt_s / 2
-        a = by_bias * P[ACC_BIAS, i] + by_course * turned
-        b = P[LEFT_BIAS, i] + by_speed * P[V, i] + by_gyro * P[GYRO_BIAS, i]
-        P[ACC_BIAS, i], P[LEFT_BIAS, i] = c * a + n * b, c * b - n * a
+    turn_columns(P, s, node)
+    turn_columns(P.T, s, node)
 
 
 @njit(nogil=True)
 def turn_columns(C: Floats, s: Floats, node: Node) -> None:
-    """Do to the columns of C, covariances with the predicted state, what `predict_tilt` does to that state.
-
-    s: before `predict_tilt`. Only its derivative is needed here; a test compares the two.
-    """
-    w = node.dyaw - s[GYRO_BIAS] * node.dt_s
-    share = node.tilt_gain / node.dt_s
+    """Do to the columns of C, covariances with the predicted state s, what `predict_tilt` does to that state."""
+    w, share = node.dyaw - s[GYRO_BIAS] * node.dt_s, node.tilt_gain / node.dt_s
     _, across = increments(node, s[MOUNT] + s[SLIP] + w / 2)
     c, n = math.cos(w), math.sin(w)
+    by_bias, by_course = 1.0 + min(node.tilt_gain, node.dt_s / TAU), -share * across
+    by_speed, by_gyro = -share * w, node.tilt_gain * s[V]
     for i in range(N):
         turned = C[i, MOUNT] + C[i, SLIP] - C[i, GYRO_BIAS] * node.dt_s / 2
-        a = (1.0 + min(node.tilt_gain, node.dt_s / TAU)) * C[i, ACC_BIAS] - share * across * turned
-        b = C[i, LEFT_BIAS] - share * w * C[i, V] + node.tilt_gain * s[V] * C[i, GYRO_BIAS]
+        a = by_bias * C[i, ACC_BIAS] + by_course * turned
+        b = C[i, LEFT_BIAS] + by_speed * C[i, V] + by_gyro * C[i, GYRO_BIAS]
         C[i, ACC_BIAS], C[i, LEFT_BIAS] = c * a + n * b, c * b - n * a
 
 

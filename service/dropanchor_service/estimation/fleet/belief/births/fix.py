@@ -8,7 +8,9 @@ import math
 from typing import Final
 
 from dropanchor_service.estimation.fleet.belief.births.forgetting import NOISE, forget
+from dropanchor_service.estimation.fleet.belief.gap import SPEED_CHANGE
 from dropanchor_service.estimation.fleet.belief.layout import FIX_SLOTS, PHI, Anchor, Anchors, Hypothesis, R, Row
+from dropanchor_service.estimation.fleet.belief.publish import LARGE_M, RERESOLVE_AFTER
 from dropanchor_service.estimation.fleet.belief.start import horizontal_distance, start_distance, starts_at_place
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import NO_HEADING, RANGE, Node
@@ -18,11 +20,8 @@ TOGETHER_NS: Final = 1_500_000_000  # ns in which their ranges come
 LEAST_SPREAD: Final = 1.0  # m^2, of the anchors across the line through them: a place beside a line has a mirror image
 ROUNDS: Final = 6
 WORST: Final = 9.0  # sum of squares of what is left, in variances, up to which the ranges agree
-LARGEST_STD: Final = 3.0  # m, of a place that is worth starting at
 LARGEST_HEIGHT_STD: Final = 1.0  # m, with which a range still tells a horizontal distance
 PATIENCE_S: Final = 5.0  # s for which a tag whose start is told waits for a heading
-SPEED_STD: Final = 1.0  # m/s, there
-GAP_S: Final = 3.0  # s without a range after which a tag without a heading has a new place
 APART: Final = 4.0  # standard deviations between its track and a new place that contradict it
 RUN: Final = 8  # ranges in a row with a contradiction: a wrong one is in as many places as there are anchors
 DOUBT_NS: Final = 10_000_000_000  # ns after such a run for which no place is believed: at some, wrong ranges agree
@@ -43,7 +42,7 @@ def is_fixed_anew(one: Hypothesis, row: Row, node: Node, anchors: Anchors) -> bo
         _note(row, node)
         x, y, variance, misfit = _solved(row, node, anchors)
         _count(row, node, misfit, _is_off(one, anchors[row.anchor], x, y, variance))
-    heard = node.heading_kind == NO_HEADING and node.dt_s < GAP_S
+    heard = node.heading_kind == NO_HEADING and node.dt_s < RERESOLVE_AFTER
     again = not heard or start.fix_run > RUN or one.mean[R] < NEAR
     if again:
         start.free = start.fix_run = start.known = start.after_gap = 0
@@ -81,12 +80,12 @@ def start_at_fix(row: Row, node: Node, anchors: Anchors) -> bool:
     x, y, variance, misfit = _solved(row, node, anchors)
     _count(row, node, misfit, False)
     doubted = start.contradicted_ns > 0 and node.t_ns - start.contradicted_ns < DOUBT_NS
-    if doubted or not (misfit < WORST and variance < LARGEST_STD**2):
+    if doubted or not (misfit < WORST and variance < LARGE_M**2):
         return False
     start.known, start.after_gap = 1, 0
     start.x, start.y, start.std = x, y, math.sqrt(variance)
     start.heading = start.other_x = math.nan
-    start.speed_std = SPEED_STD
+    start.speed_std = SPEED_CHANGE
     if node.heading_kind == NO_HEADING:
         row.anchor = _farthest(row, node)
         forget(row, NOISE)
@@ -122,62 +121,54 @@ def _is_fresh(row: Row, node: Node, k: int) -> bool:
 
 
 @njit(nogil=True)
-def _distance(row: Row, anchor: Anchor, k: int) -> float:
-    """Return the horizontal distance, m, of the range in a slot."""
-    return horizontal_distance(row, anchor, start_distance(row, row.start.fix_z[k]))
+def _round(
+    row: Row, node: Node, anchors: Anchors, linear: bool, x: float, y: float, ms: float
+) -> tuple[float, float, float, float]:
+    """Return a step (x, y) of least squares, the least eigenvalue of its matrix, and the squares that are left.
 
-
-@njit(nogil=True)
-def _guess(row: Row, node: Node, anchors: Anchors) -> tuple[float, float, bool]:
-    """Return (x, y) from the differences of the squares to their mean, and whether enough anchors span a plane."""
-    n, mx, my, ms = 0, 0.0, 0.0, 0.0
+    linear: from the differences of the squares to their mean ms, with the mean (x, y) of the anchors.
+    """
+    xx = xy = yy = bx = by = misfit = 0.0
     for k in range(FIX_SLOTS):
-        if _is_fresh(row, node, k):
-            a = anchors[row.start.fix_anchor[k]]
-            n += 1
-            mx += a.x
-            my += a.y
-            ms += a.x * a.x + a.y * a.y - _distance(row, a, k) ** 2
-    if n < LEAST:
-        return 0.0, 0.0, False
-    mx, my, ms = mx / n, my / n, ms / n
-    xx = xy = yy = bx = by = 0.0
-    for k in range(FIX_SLOTS):
-        if _is_fresh(row, node, k):
-            a = anchors[row.start.fix_anchor[k]]
-            dx, dy = a.x - mx, a.y - my
-            half = 0.5 * (a.x * a.x + a.y * a.y - _distance(row, a, k) ** 2 - ms)
-            xx, xy, yy = xx + dx * dx, xy + dx * dy, yy + dy * dy
-            bx, by = bx + dx * half, by + dy * half
-    least = 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy)
-    if least < LEAST_SPREAD:
-        return 0.0, 0.0, False
-    det = xx * yy - xy * xy
-    return (yy * bx - xy * by) / det, (xx * by - xy * bx) / det, True
+        if not _is_fresh(row, node, k):
+            continue
+        a, settings, d = anchors[row.start.fix_anchor[k]], row.settings, _distance(row, anchors, k)
+        if linear:
+            ux, uy, w, e = a.x - x, a.y - y, 1.0, 0.5 * (a.x * a.x + a.y * a.y - d * d - ms)
+        else:
+            r, d = max(math.hypot(x - a.x, y - a.y), 1e-3), max(d, 0.1)
+            tilt = (settings.height - a.z) / d * settings.height_std
+            w = 1.0 / (settings.range_std**2 + settings.range_bias_std**2 + tilt * tilt)
+            ux, uy, e = (x - a.x) / r, (y - a.y) / r, d - r
+        xx, xy, yy = xx + w * ux * ux, xy + w * ux * uy, yy + w * uy * uy
+        bx, by, misfit = bx + w * ux * e, by + w * uy * e, misfit + w * e * e
+    det, least = xx * yy - xy * xy, 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy)
+    return (yy * bx - xy * by) / det, (xx * by - xy * bx) / det, least, misfit
 
 
 @njit(nogil=True)
 def _solved(row: Row, node: Node, anchors: Anchors) -> tuple[float, float, float, float]:
     """Return (x, y, variance along the worst axis m^2, sum of squares of what is left in variances); inf: no place."""
-    x, y, spanned = _guess(row, node, anchors)
-    if not spanned:
-        return x, y, math.inf, math.inf
-    variance = misfit = math.inf
+    n = mx = my = ms = 0.0
+    for k in range(FIX_SLOTS):
+        if _is_fresh(row, node, k):
+            a = anchors[row.start.fix_anchor[k]]
+            n, mx, my = n + 1.0, mx + a.x, my + a.y
+            ms += a.x * a.x + a.y * a.y - _distance(row, anchors, k) ** 2
+    if n < LEAST:
+        return 0.0, 0.0, math.inf, math.inf
+    x, y, least, misfit = _round(row, node, anchors, True, mx / n, my / n, ms / n)
+    if least < LEAST_SPREAD:
+        return 0.0, 0.0, math.inf, math.inf
     for _ in range(ROUNDS):
-        xx = xy = yy = bx = by = misfit = 0.0
-        for k in range(FIX_SLOTS):
-            if _is_fresh(row, node, k):
-                a, settings = anchors[row.start.fix_anchor[k]], row.settings
-                dx, dy, d = x - a.x, y - a.y, max(_distance(row, a, k), 0.1)
-                r = max(math.hypot(dx, dy), 1e-3)
-                tilt = (settings.height - a.z) / d * settings.height_std
-                w = 1.0 / (settings.range_std**2 + settings.range_bias_std**2 + tilt * tilt)
-                ux, uy, e = dx / r, dy / r, d - r
-                xx, xy, yy = xx + w * ux * ux, xy + w * ux * uy, yy + w * uy * uy
-                bx, by, misfit = bx + w * ux * e, by + w * uy * e, misfit + w * e * e
-        det = xx * yy - xy * xy
-        if det < 1e-9:
+        dx, dy, least, misfit = _round(row, node, anchors, False, x, y, 0.0)
+        if least < 1e-9:
             return x, y, math.inf, math.inf
-        x, y = x + (yy * bx - xy * by) / det, y + (xx * by - xy * bx) / det
-        variance = 1.0 / max(0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy), 1e-9)
-    return x, y, variance, misfit
+        x, y = x + dx, y + dy
+    return x, y, 1.0 / least, misfit
+
+
+@njit(nogil=True)
+def _distance(row: Row, anchors: Anchors, k: int) -> float:
+    """Return the horizontal distance, m, of the range in a slot."""
+    return horizontal_distance(row, anchors[row.start.fix_anchor[k]], start_distance(row, row.start.fix_z[k]))
