@@ -29,8 +29,8 @@ export class PastEvents extends EventTarget {
     this.dispatchEvent(new Event("change"));
   }
 
-  /** When each happened. @returns {import("../data/periods.js").Period[]} */
+  /** When each happened, in ms. */
   get times() {
-    return this.events.map(({ time }) => ({ from_ms: Date.parse(time), to_ms: Date.parse(time) }));
+    return this.events.map(({ time }) => Date.parse(time));
   }
 }
