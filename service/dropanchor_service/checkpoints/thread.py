@@ -37,7 +37,7 @@ class CheckpointThread(Worker):
         self._requested = threading.Event()
         self._taken = threading.Event()
         self._snapshot: Snapshot | None = None
-        self._messages = 0  # in the newest checkpoint of this process
+        self._messages = -1  # in the newest checkpoint
         self._current_s = time.monotonic()  # when the newest checkpoint, or the loaded one, was last up to date
         self._error: str | None = None
         self._pause_s = min(period_s, FIRST_S)
@@ -141,7 +141,8 @@ class CheckpointThread(Worker):
             self._log.exception("checkpoint", error)
             return
         took_s = time.monotonic() - began_s  # of a write that failed it says nothing: it may have waited in vain
-        self._pause_s = max(self._period_s, REST * took_s, min(LONGEST_S, size / WEAR_BYTES_S))
+        if self._of[0]:  # messages: the next checkpoint is not the first one with tags
+            self._pause_s = max(self._period_s, REST * took_s, min(LONGEST_S, size / WEAR_BYTES_S))
         self._messages, self._current_s = self._of
         self._metrics.checkpoints.labels("written").inc()
         self._metrics.checkpoint_bytes.set(size)

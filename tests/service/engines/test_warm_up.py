@@ -35,9 +35,7 @@ def test_the_name_depends_on_every_package_with_kernels() -> None:
     of_packages = {source for name in KERNEL_SOURCES for source in (package / name).rglob("*.py")}
     assert len(with_kernels(package)) > 10
     assert with_kernels(package) <= of_packages
-    assert with_kernels(evaluation) == {
-        evaluation / name for name in ("pcrb.py", "bounds/recursion.py", "paper/compiled.py")
-    }
+    assert with_kernels(evaluation) == {evaluation / name for name in ("bounds/recursion.py", "paper/compiled.py")}
 
 
 def with_kernels(package: Path) -> set[Path]:

@@ -89,10 +89,11 @@ def with_rows(by_kind: dict[str, Array], kind: str, rejected: dict[str, Array]) 
 
 def modes_of(nodes: Array, beliefs: Array, rows: Array, pool: Array, anchors: Array, workspace: Array) -> Array:
     """Return HYPOTHESIS: the modes of each row that its last node left ambiguous. A row's nodes are together."""
-    last = np.append(nodes["row"][1:] != nodes["row"][:-1], True)
-    ambiguous = nodes["row"][(beliefs["state"] == AMBIGUOUS) & last] if len(nodes) else nodes["row"]
+    last = np.ones(len(nodes), bool)
+    last[:-1] = nodes["row"][1:] != nodes["row"][:-1]
+    ambiguous = nodes["row"][(beliefs["state"] == AMBIGUOUS) & last]
     modes = np.zeros(MODES * len(ambiguous), HYPOTHESIS)
-    return modes[: _write_modes(ambiguous, rows, pool, anchors, workspace, modes)] if len(ambiguous) else modes
+    return modes[: _write_modes(ambiguous, rows, pool, anchors, workspace, modes)]
 
 
 @njit(cache=True, nogil=True)
