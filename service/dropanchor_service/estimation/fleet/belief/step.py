@@ -1,6 +1,6 @@
 """Run the pose belief of many rows over a batch of nodes, in one compiled call."""
 
-from dropanchor_service.estimation.fleet.belief.births.carrying import follow_motion, moves_anew, turn_device
+from dropanchor_service.estimation.fleet.belief.births.carrying import follow_motion, turn_device, was_walked_off
 from dropanchor_service.estimation.fleet.belief.births.direction import follow_rest, push_back, turn_back
 from dropanchor_service.estimation.fleet.belief.births.first import restart_on_ring
 from dropanchor_service.estimation.fleet.belief.births.fix import is_fixed_anew
@@ -207,7 +207,7 @@ def _advance_row(
         accumulate_gap(work, count, row, node)
     if count > 0 and (
         is_track_lost(row, node)
-        or moves_anew(row, node, t)
+        or was_walked_off(row, node, t)
         or is_fixed_anew(work[best_of(work, count)], row, node, anchors)
     ):
         release(row, pool, scratch.lane)

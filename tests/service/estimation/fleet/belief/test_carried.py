@@ -14,9 +14,9 @@ from dropanchor_service.estimation.columns import Motion
 from dropanchor_service.estimation.fleet.belief.births.carrying import (
     ANY_DIRECTION_VAR,
     follow_motion,
-    moves_anew,
     start_carried,
     turn_device,
+    was_walked_off,
 )
 from dropanchor_service.estimation.fleet.belief.layout import (
     GAIT_OFFSET,
@@ -132,14 +132,7 @@ def test_who_is_carried_from_a_given_start_may_be_held_in_any_way_there() -> Non
 def test_who_walks_off_before_anything_is_certain_starts_again_only_where_no_start_was_told(known: int) -> None:
     row, _, node = row_of_a_walk(2.0)
     row["start"]["known"], row["publication"]["resolved"] = known, 0
-    assert moves_anew(row, node, T.record()[0]) == (known == 0)
-
-
-def test_a_tag_that_was_set_down_on_what_does_not_walk_starts_again_and_not_where_it_was_told_to() -> None:
-    row, _, node = row_of_a_walk(0.0)
-    row["walk"]["carried"], row["start"]["known"], node["carried"] = 1, 1, 0
-    assert moves_anew(row, node, T.record()[0])
-    assert row["start"]["known"] == 0
+    assert was_walked_off(row, node, T.record()[0]) == (known == 0)
 
 
 def test_what_a_vehicle_took_for_an_error_of_the_platforms_heading_is_forgotten() -> None:

@@ -7,17 +7,20 @@ import math
 from typing import Final
 
 from dropanchor_service.estimation.fleet.angles import TWO_PI, wrap
-from dropanchor_service.estimation.fleet.belief.births.forgetting import PLACE, SIGHT, forget
+from dropanchor_service.estimation.fleet.belief.births.forgetting import SIGHT, forget
 from dropanchor_service.estimation.fleet.belief.births.numbers import (
     CARRIED_START,
     DEVICE_TURN,
     PICK_UP,
+    SET_DOWN,
     WALKED_OFF,
 )
 from dropanchor_service.estimation.fleet.belief.heading_reference import is_of_another_axis, restart_reference
 from dropanchor_service.estimation.fleet.belief.layout import (
+    ACC_BIAS,
     GAIT_OFFSET,
     GYRO_BIAS,
+    LEFT_BIAS,
     MOUNT,
     PHI,
     RANGE_BIAS,
@@ -47,8 +50,7 @@ MOUNT_KNOWN: Final = 0.3  # rad, of a mounting angle that the operator knows
 @njit(nogil=True)
 def follow_motion(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> int:
     """Make the hypotheses those of what moves the tag now. Return their count."""
-    if node.carried == 0 or not is_on(PICK_UP, t):
-        node.carried = row.walk.carried
+    _keep_motion(row, node, t)
     if row.walk.carried == node.carried:
         if node.carried == 0 and (node.walked == 0.0 or row.walk.var == 0.0):
             s, P = work[best_of(work, count)].mean, work[best_of(work, count)].cov
@@ -59,9 +61,21 @@ def follow_motion(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning)
         node.carried = 0
         return count
     row.walk.carried = node.carried
+    if node.carried == 0:
+        _set_down(work, count, row, t)
+        return count
     if node.heading_kind == MEASURED_HEADING:
         restart_reference(work[best_of(work, count)], row, node.heading - node.dyaw, node.heading_var)
     return _pick_up(work, count, row, node, t)
+
+
+@njit(nogil=True)
+def _keep_motion(row: Row, node: Node, t: Tuning) -> None:
+    """Let nothing change what moves the tag where that change is switched off."""
+    if row.walk.carried == 0 and not is_on(PICK_UP, t):
+        node.carried = 0
+    elif row.walk.carried == 1 and not is_on(SET_DOWN, t):
+        node.carried = 1
 
 
 @njit(nogil=True)
@@ -82,19 +96,15 @@ def start_carried(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning)
 
 
 @njit(nogil=True)
-def moves_anew(row: Row, node: Node, t: Tuning) -> bool:
-    """Return whether the hypotheses say nothing of what moves the tag now.
+def was_walked_off(row: Row, node: Node, t: Tuning) -> bool:
+    """Return whether a person carries a tag whose place was not known when the steps began.
 
-    They are those of a vehicle that steps accelerated, where a person carries a tag whose place was not known when the
-    steps began, and those of a walk where somebody set the tag down, on what does not walk. Then its start is past.
+    Its hypotheses are those of a vehicle that the steps accelerated, and no others are left.
     """
+    unknown = row.publication.resolved == 0 and row.start.known == 0
+    steps = node.carried == 1 and row.walk.carried == 0
     allowed = is_on(WALKED_OFF, t) and is_on(CARRIED_START, t)  # else it would start so again and again
-    if row.walk.carried == node.carried or not allowed:
-        return False
-    if node.carried == 0:
-        forget(row, PLACE)
-        return True
-    return bool(row.publication.resolved == 0 and row.start.known == 0)
+    return bool(unknown and steps and allowed)
 
 
 @njit(nogil=True)
@@ -179,6 +189,19 @@ def _walk_from_origin(one: Hypothesis, row: Row, node: Node, t: Tuning) -> None:
     s[R], s[PHI] = max(math.hypot(x, y), 0.1), math.atan2(y, x)
     clear_state(P, R, variance)
     clear_state(P, PHI, variance / s[R] ** 2)
+
+
+@njit(nogil=True)
+def _set_down(work: Hypotheses, count: int, row: Row, t: Tuning) -> None:
+    """Make all hypotheses those of a vehicle whose mounting angle is not known."""
+    for h in range(count):
+        s, P = work[h].mean, work[h].cov
+        s[ACC_BIAS] = s[LEFT_BIAS] = s[SLIP] = 0.0
+        clear_state(P, ACC_BIAS, t.acc_bias_std**2)
+        clear_state(P, LEFT_BIAS, t.left_bias_std**2)
+        clear_state(P, SLIP, row.settings.slip_std**2)
+        P[MOUNT, MOUNT] += row.settings.mount_angle_std**2
+        P[V, V] += t.walk_speed_std**2
 
 
 @njit(nogil=True)
