@@ -1,6 +1,7 @@
 """The page shows zones and events, live."""
 
 import re
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from threading import Event
@@ -63,8 +64,9 @@ def test_who_is_where_names_the_tags_in_each_zone_longest_first_and_can_be_print
 ) -> None:
     for tag in ("late", "early"):
         yard.move(tag, x=-10.0, y=-10.0)
-    yard.go("early", 3.0, 3.0)
-    yard.go("late", 2.0, 2.0, state=State.COASTING)
+    fresh_ns = time.time_ns() + 600_000_000_000  # their states stay what they are, however long the page takes
+    yard.go("early", 3.0, 3.0, t_ns=fresh_ns)
+    yard.go("late", 2.0, 2.0, t_ns=fresh_ns + 1_000_000_000, state=State.COASTING)
     with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
         page.page.locator("#zone-list summary").click()
         page.page.locator("#zone-list li", has_text="Yard").get_by_role("button", name="2 tags inside").click()
@@ -73,7 +75,7 @@ def test_who_is_where_names_the_tags_in_each_zone_longest_first_and_can_be_print
         expect(dialog.locator("section").nth(0).locator("li")).to_have_text(
             [re.compile(r"^early [\d.]+ s$"), re.compile(r"^late [\d.]+ s · Coasting$")]
         )
-        yard.go("late", -10.0, -10.0)
+        yard.go("late", -10.0, -10.0, t_ns=fresh_ns + 2_000_000_000)
         expect(dialog.locator("h3")).to_have_text(["Yard: 1", "Dock: 0", "In no zone: 2"])
         page.page.emulate_media(media="print")
         expect(page.page.locator("main")).to_be_hidden()
