@@ -3,7 +3,7 @@
 import { retractedBy } from "./event_log.js";
 import { clock, probability, sentence, why } from "./words.js";
 import { t } from "../i18n/language.js";
-import { write } from "../page/parts.js";
+import { write, writeOrHide } from "../page/parts.js";
 
 /** @typedef {import("./words.js").ServiceEvent} ServiceEvent */
 
@@ -22,12 +22,11 @@ export class EventList {
   }
 
   update() {
-    const { events, current } = this.log;
+    const { events, current, note, none } = this.log;
     const newest = events[0];
-    write(this.newest, !current ? t("events.outdated") : newest ? t("events.newest", { time: clock(newest), event: sentence(newest) }) : t("events.none"));
+    write(this.newest, !current ? t("events.outdated") : newest ? t("events.newest", { time: clock(newest), event: sentence(newest) }) : none);
     this.box.classList.toggle("outdated", !current);
-    write(this.note, current ? (newest ? "" : t("events.nothing")) : t("events.missing"));
-    this.note.hidden = this.note.textContent === "";
+    writeOrHide(this.note, note);
     this.#show(events);
   }
 

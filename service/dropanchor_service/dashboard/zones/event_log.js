@@ -3,6 +3,7 @@
 import { request } from "../data/access.js";
 import { api, getJson } from "../data/connection.js";
 import { eventsOf } from "../data/events.js";
+import { t } from "../i18n/language.js";
 
 /** @typedef {import("./words.js").ServiceEvent} ServiceEvent */
 
@@ -27,6 +28,7 @@ export class EventLog extends EventTarget {
   events = [];
   /** Whether the stream of events is connected, so that none is missing. */
   current = false;
+  none = t("events.none");
   #stream = new AbortController();
   #timer = 0;
 
@@ -42,6 +44,12 @@ export class EventLog extends EventTarget {
     if (signal.aborted) return;
     this.#become(false);
     this.#timer = setTimeout(() => this.start(), RETRY_MS);
+  }
+
+  /** What to know about the list. */
+  get note() {
+    if (!this.current) return t("events.missing");
+    return this.events.length === 0 ? t("events.nothing") : "";
   }
 
   stop() {

@@ -1,13 +1,17 @@
 /** Who is in which zone, those first that have been there longest, and who is in none: to look at, and to print. */
 
-import { age } from "../data/format.js";
 import { api, getJson } from "../data/connection.js";
-import { t } from "../i18n/language.js";
+import { partOf, write } from "../page/parts.js";
+import { clock } from "./words.js";
+import { t, timeText } from "../i18n/language.js";
 
 /** @typedef {{tag: string, since_ns: number}} Occupant */
-/** @typedef {{title: string, zone: string | null, tags: {tag: string, note: string}[]}} Group zone: null for all others */
+/** @typedef {{tag: string, label: string, note: string}} Line note: since when it is there, and its state unless that is good */
+/** @typedef {{title: string, zone: string | null, tags: Line[]}} Group zone: null for all others */
 
 export class Headcount {
+  #shown = ""; // a line with the focus keeps it while nothing changes
+
   /** @param {HTMLDialogElement} dialog @param {import("./zone_store.js").ZoneStore} store @param {import("../data/fleet.js").Fleet} fleet
    * @param {(tag: string) => void} selectTag */
   constructor(dialog, store, fleet, selectTag) {
@@ -15,14 +19,9 @@ export class Headcount {
     this.store = store;
     this.fleet = fleet;
     this.selectTag = selectTag;
-    this.part("print").addEventListener("click", () => print());
-    this.part("close").addEventListener("click", () => dialog.close());
+    partOf(dialog, "print").addEventListener("click", () => print());
+    partOf(dialog, "close").addEventListener("click", () => dialog.close());
     store.addEventListener("change", () => dialog.open && this.#update());
-  }
-
-  /** @param {string} name @returns {HTMLElement} */
-  part(name) {
-    return /** @type {HTMLElement} */ (this.dialog.querySelector(`[data-part="${name}"]`));
   }
 
   /** Show the list, from this zone on if one is named. @param {string | null} zone */
@@ -34,8 +33,11 @@ export class Headcount {
 
   async #update() {
     const answer = await getJson(api("zone-occupancy?names=true")).catch(() => null);
-    this.part("when").textContent = answer ? new Date().toLocaleString(document.documentElement.lang) : t("zones.outdated");
-    if (answer) this.part("groups").replaceChildren(...this.#groups(answer.zones).map((group) => this.#section(group)));
+    write(partOf(this.dialog, "when"), answer ? timeText(Date.now(), { dateStyle: "full", timeStyle: "medium" }) : t("zones.outdated"));
+    const groups = /** @type {Group[] | null} */ (answer && this.#groups(answer.zones));
+    const shown = JSON.stringify(groups);
+    if (groups && shown !== this.#shown) partOf(this.dialog, "groups").replaceChildren(...groups.map((group) => this.#section(group)));
+    this.#shown = shown;
   }
 
   /** @param {{zone: string, inside: Occupant[]}[]} occupied @returns {Group[]} */
@@ -44,10 +46,10 @@ export class Headcount {
     const inside = new Map(occupied.map((one) => [one.zone, one.inside]));
     const groups = this.store.zones.map(({ id, name }) => ({
       title: name || id, zone: id,
-      tags: (inside.get(id) ?? []).map(({ tag, since_ns }) => ({ tag, note: age(Date.now() / 1e3 - since_ns / 1e9) })),
+      tags: (inside.get(id) ?? []).map(({ tag, since_ns }) => this.#line(tag, t("headcount.since", { time: clock({ time: since_ns / 1e6 }) }))),
     }));
     const known = new Set(occupied.flatMap((one) => one.inside.map(({ tag }) => tag)));
-    const others = fleet.names.filter((tag) => !known.has(tag)).sort().map((tag) => ({ tag, note: "" }));
+    const others = fleet.names.filter((tag) => !known.has(tag)).sort().map((tag) => this.#line(tag));
     return [...groups, { title: t("headcount.others"), zone: null, tags: others }];
   }
 
@@ -57,22 +59,27 @@ export class Headcount {
     if (zone !== null) section.dataset.zone = zone;
     const heading = Object.assign(document.createElement("h3"), { textContent: t("headcount.zone", { zone: title, n: tags.length }) });
     const list = document.createElement("ul");
-    list.append(...tags.map(({ tag, note }) => this.#line(tag, note)));
+    list.append(...tags.map((line) => this.#item(line)));
     section.append(heading, list);
     return section;
   }
 
-  /** @param {string} tag @param {string} note since when it is there */
-  #line(tag, note) {
+  /** Return what is known of a tag. @param {string} tag @param {string} [since] @returns {Line} */
+  #line(tag, since = "") {
     const row = this.fleet.row(tag);
     const state = row < 0 ? null : this.fleet.style(row);
-    const button = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: this.fleet.labels[row] ?? tag });
+    return { tag, label: this.fleet.labels[row] ?? tag, note: [since, state?.trusted ? "" : state?.label].filter(Boolean).join(" · ") };
+  }
+
+  /** @param {Line} line */
+  #item({ tag, label, note }) {
+    const button = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: label });
     button.addEventListener("click", () => {
       this.dialog.close();
       this.selectTag(tag);
     });
-    const line = document.createElement("li");
-    line.append(button, " ", [note, state?.trusted ? "" : (state?.label ?? "")].filter(Boolean).join(" · "));
-    return line;
+    const item = document.createElement("li");
+    item.append(button, " ", note);
+    return item;
   }
 }

@@ -2,6 +2,7 @@
 
 import { api, getJson } from "../data/connection.js";
 import { nanoseconds } from "../data/track_reader.js";
+import { t } from "../i18n/language.js";
 
 /** @typedef {import("./words.js").ServiceEvent} ServiceEvent */
 
@@ -13,6 +14,8 @@ export class PastEvents extends EventTarget {
   events = [];
   /** Whether they are known. */
   current = false;
+  none = t("events.past_none");
+  #isCut = false;
   #period = "";
 
   /** @param {import("../data/periods.js").Period} period */
@@ -26,7 +29,14 @@ export class PastEvents extends EventTarget {
     if (period !== this.#period) return;
     this.events = (found?.events ?? []).filter((/** @type {ServiceEvent} */ { time }) => Date.parse(time) <= to_ms).reverse();
     this.current = found !== null;
+    this.#isCut = this.events.length === MOST;
     this.dispatchEvent(new Event("change"));
+  }
+
+  /** What to know about the list. */
+  get note() {
+    if (!this.current) return t("events.past_missing");
+    return this.#isCut ? t("events.past_cut", { n: MOST }) : "";
   }
 
   /** When each happened, in ms. */

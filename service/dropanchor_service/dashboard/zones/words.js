@@ -40,7 +40,7 @@ export function probability({ data }) {
   return t("event.probability", { probability: fixed(data.probability < 1 ? Math.floor(data.probability * 100) / 100 : 1, 2) });
 }
 
-/** Return the local time of an event, with the date unless it is today. @param {ServiceEvent} event @param {Date} [now] */
+/** Return the local time of an event, with the date unless it is today. @param {{time: string | number}} event @param {Date} [now] */
 export function clock({ time }, now = new Date()) {
   const at = new Date(time);
   const isToday = at.toDateString() === now.toDateString();
