@@ -21,7 +21,7 @@ from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.checkpoints.thread import CheckpointThread
 from dropanchor_service.engines.compiled import compiled_engine
 from dropanchor_service.engines.warm_up import CompilationProgress
-from dropanchor_service.estimation.columns import Engine
+from dropanchor_service.estimation.protocols import Engine
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.catch_up import CatchUp

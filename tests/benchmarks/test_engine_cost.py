@@ -18,7 +18,6 @@ from dropanchor_service.estimation.columns import (
     IMU,
     RANGE,
     Array,
-    Engine,
     HeadingSource,
     SampleBatch,
     State,
@@ -29,6 +28,7 @@ from dropanchor_service.estimation.paper.ekf import PoseFilter
 from dropanchor_service.estimation.paper.engine import PaperEngine
 from dropanchor_service.estimation.paper.parameters import TUNED
 from dropanchor_service.estimation.plausibility.check import SensorCheck
+from dropanchor_service.estimation.protocols import Engine
 from dropanchor_tag_client.simulator.sensors import preset
 from dropanchor_tag_client.simulator.simulation import Simulation, simulate
 

@@ -12,8 +12,8 @@ import pytest
 
 from dropanchor_schemas.keys import samples_key
 from dropanchor_schemas.wire import Frame, ImuSample, RangeSample, encode_packed
-from dropanchor_service.estimation.columns import Engine
 from dropanchor_service.estimation.fleet.engine import FleetEngine
+from dropanchor_service.estimation.protocols import Engine
 from support.ingest import IngestBench
 from support.recording_engine import RecordingEngine
 from support.traffic import T0_NS, Message, traffic

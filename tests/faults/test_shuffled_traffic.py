@@ -16,8 +16,9 @@ from dropanchor_schemas.wire import (
     encode_json,
     encode_packed,
 )
-from dropanchor_service.estimation.columns import POSE, Array, Engine
+from dropanchor_service.estimation.columns import POSE, Array
 from dropanchor_service.estimation.fleet.engine import FleetEngine
+from dropanchor_service.estimation.protocols import Engine
 from support.ingest import IngestBench
 from support.manual_clock import ManualClock
 from support.recording_engine import RecordingEngine

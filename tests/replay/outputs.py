@@ -9,12 +9,13 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from dropanchor_service.estimation.columns import Array, Engine, MeasurementKind, PoseBatch
+from dropanchor_service.estimation.columns import Array, MeasurementKind, PoseBatch
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.fleet.smoother.smoothed import smoothed_poses
 from dropanchor_service.estimation.fleet.smoother.trace import TracingEngine
 from dropanchor_service.estimation.paper.engine import PaperEngine
 from dropanchor_service.estimation.paper.parameters import TUNED
+from dropanchor_service.estimation.protocols import Engine
 from replay.samples import BATCH_S, FOLDER, NS_PER_S, anchors_of, read_batches, settings_of
 from replay.scenarios import SCENARIOS, Scenario
 

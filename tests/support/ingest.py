@@ -13,7 +13,8 @@ from dropanchor_schemas.keys import samples_key
 from dropanchor_schemas.wire import ENCODING_PACKED, Frame, encode_packed
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.engines.warm_up import warm_up_ingest
-from dropanchor_service.estimation.columns import POSE, Array, Engine, PoseBatch, SampleBatch, State
+from dropanchor_service.estimation.columns import POSE, Array, PoseBatch, SampleBatch, State
+from dropanchor_service.estimation.protocols import Engine
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.guarded_engine import GuardedEngine

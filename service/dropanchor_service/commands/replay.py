@@ -14,7 +14,8 @@ from dropanchor_service.commands.replay_output import SOURCE, check, opened, val
 from dropanchor_service.commands.replay_report import no_usable_range, report, score_of
 from dropanchor_service.commands.replay_source import mcap_files_of
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.estimation.columns import Array, Engine
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.protocols import Engine
 from dropanchor_service.offline.prepared import prepared, with_units
 from dropanchor_service.offline.replay import (
     NS_PER_S,

@@ -3,7 +3,7 @@
 from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.engines.compile_apart import compile_apart
 from dropanchor_service.engines.warm_up import CompilationProgress, warm_up_answers, warm_up_ingest, warm_up_zones
-from dropanchor_service.estimation.columns import Engine
+from dropanchor_service.estimation.protocols import Engine
 from dropanchor_service.settings.model import Settings
 
 

@@ -33,13 +33,12 @@ from dropanchor_service.estimation.columns import (
     INNOVATION,
     POSE,
     RANGE,
-    Engine,
-    FollowsAnchors,
     SampleBatch,
     State,
     default_settings,
 )
 from dropanchor_service.estimation.plausibility.check import SensorCheck
+from dropanchor_service.estimation.protocols import Engine, FollowsAnchors
 from dropanchor_service.ingest.decode import read_forms, read_samples
 from dropanchor_service.ingest.kernels.anchors import HEARD, STEP, follow_anchors
 from dropanchor_service.ingest.kernels.arrivals import record_arrivals

@@ -7,17 +7,10 @@ import numpy as np
 
 from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.wire import Reason
-from dropanchor_service.estimation.columns import (
-    TAG_SETTINGS,
-    Array,
-    Engine,
-    FollowsAnchors,
-    PoseBatch,
-    Restorable,
-    SampleBatch,
-)
+from dropanchor_service.estimation.columns import TAG_SETTINGS, Array, PoseBatch, SampleBatch
 from dropanchor_service.estimation.plausibility.check import Checked, SensorCheck
 from dropanchor_service.estimation.plausibility.layout import make_checks
+from dropanchor_service.estimation.protocols import Engine, FollowsAnchors, Restorable
 from dropanchor_service.ingest.anchor_watch import AnchorWatch
 from dropanchor_service.ingest.anchors import AnchorTable, have_moved
 from dropanchor_service.ingest.configured import Configured

@@ -5,8 +5,8 @@ from collections import deque
 import numpy as np
 
 from dropanchor_schemas.site import TagSettings
-from dropanchor_service.estimation.columns import DeniesStarts, Engine
 from dropanchor_service.estimation.north import LearnsNorth
+from dropanchor_service.estimation.protocols import DeniesStarts, Engine
 from dropanchor_service.store.norths import North, Norths
 
 EVERY_NS = 1_000_000_000

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from dropanchor_schemas.site import TagSettings
-from dropanchor_service.estimation.columns import Engine, FollowsPressure
+from dropanchor_service.estimation.protocols import Engine, FollowsPressure
 
 NONE = -1
 

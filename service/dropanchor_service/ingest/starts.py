@@ -9,14 +9,8 @@ confirmed. Where ranges told no noise, 1 was confirmed. All 16 right ones were.
 import numpy as np
 
 from dropanchor_schemas.site import TagSettings
-from dropanchor_service.estimation.columns import (
-    Array,
-    DeniesStarts,
-    Engine,
-    PoseBatch,
-    State,
-    StateReason,
-)
+from dropanchor_service.estimation.columns import Array, PoseBatch, State, StateReason
+from dropanchor_service.estimation.protocols import DeniesStarts, Engine
 from dropanchor_service.ingest.kernels.starts import OPEN, SETTLED_M, follow_starts
 from dropanchor_service.store.records import enlarged, take
 from dropanchor_service.store.starts import StartNews, StartNewsQueue, StartPhase

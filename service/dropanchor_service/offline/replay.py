@@ -9,19 +9,10 @@ import numpy as np
 
 from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.wire import anchor_number
-from dropanchor_service.estimation.columns import (
-    HEADING,
-    IMU,
-    POSE,
-    PRESSURE,
-    RANGE,
-    Array,
-    Engine,
-    SampleBatch,
-    anchors_at,
-)
+from dropanchor_service.estimation.columns import HEADING, IMU, POSE, PRESSURE, RANGE, Array, SampleBatch, anchors_at
 from dropanchor_service.estimation.fleet.smoother.smoothed import smoothed_poses
 from dropanchor_service.estimation.fleet.smoother.trace import TracingEngine
+from dropanchor_service.estimation.protocols import Engine
 from dropanchor_service.ingest.decode import IMU_SAMPLE, SCALAR, Decoded
 from dropanchor_service.ingest.kernels.packed import FORM
 from dropanchor_service.ingest.screening import screen

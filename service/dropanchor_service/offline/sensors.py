@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from dropanchor_schemas.rejections import Reason
-from dropanchor_service.estimation.columns import Array, Engine, PoseBatch, SampleBatch
+from dropanchor_service.estimation.columns import Array, PoseBatch, SampleBatch
 from dropanchor_service.estimation.plausibility.check import SensorCheck
 from dropanchor_service.estimation.plausibility.layout import CHECK, DOUBTS
 from dropanchor_service.estimation.plausibility.recorded import in_steps
 from dropanchor_service.estimation.plausibility.verdicts import Finding, ImuVerdict, RangeVerdict
+from dropanchor_service.estimation.protocols import Engine
 from dropanchor_service.offline.replay import NS_PER_S, Samples
 
 EARLY_S = 60.0

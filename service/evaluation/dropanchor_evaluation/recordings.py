@@ -10,7 +10,8 @@ from dropanchor_evaluation.operator_knowledge import PROTOTYPE, apply_operator_k
 from dropanchor_evaluation.paper.engines import engines
 from dropanchor_evaluation.parallel import Workers
 from dropanchor_evaluation.report import Cell, Section, Table
-from dropanchor_service.estimation.columns import Array, Engine, default_settings
+from dropanchor_service.estimation.columns import Array, default_settings
+from dropanchor_service.estimation.protocols import Engine
 from dropanchor_service.offline.accuracy import Truth, accuracy
 from dropanchor_service.offline.replay import anchors_of, replay, samples_of, track_of, truth_of
 from dropanchor_tag_client.recording import Recording, RecordingError, read_recording

@@ -14,12 +14,12 @@ from dropanchor_service.estimation.columns import (
     PRESSURE,
     RANGE,
     Array,
-    Engine,
     HeadingSource,
     SampleBatch,
     anchors_at,
     default_settings,
 )
+from dropanchor_service.estimation.protocols import Engine
 from dropanchor_service.offline.accuracy import Truth
 from dropanchor_service.offline.replay import NS_PER_S, STEP_S, Track
 from dropanchor_tag_client.simulator.imu import Imu

@@ -6,18 +6,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.columns import (
-    HEADING,
-    RANGE,
-    Array,
-    Engine,
-    SampleBatch,
-    anchors_at,
-    default_settings,
-)
+from dropanchor_service.estimation.columns import HEADING, RANGE, Array, SampleBatch, anchors_at, default_settings
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.paper.engine import PaperEngine
 from dropanchor_service.estimation.paper.parameters import TUNED
+from dropanchor_service.estimation.protocols import Engine
 
 SCALE, BIAS, RANGE_STD = 1.069, 0.3, 0.1
 ANCHORS = anchors_at((0.0, 0.0, 0.0), (4.0, 3.0, 2.0))

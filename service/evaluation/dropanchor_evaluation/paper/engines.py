@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from dropanchor_service.estimation.columns import Engine
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.paper.engine import PaperEngine
 from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
+from dropanchor_service.estimation.protocols import Engine
 
 WITHOUT_SPEED = 1.0  # blend: full weight on the speed of the EKF
 

@@ -11,9 +11,10 @@ from dropanchor_evaluation.paper import tuning
 from dropanchor_evaluation.paper.compiled import Estimate
 from dropanchor_evaluation.pcrb import Information
 from dropanchor_evaluation.simulated import Feed, PriorKnowledge, Timed, run_engine
-from dropanchor_service.estimation.columns import POSE, Array, Engine, State
+from dropanchor_service.estimation.columns import POSE, Array, State
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.paper.parameters import PaperParameters
+from dropanchor_service.estimation.protocols import Engine
 from dropanchor_service.offline.replay import NS_PER_S, Track
 from dropanchor_tag_client.simulator.simulation import Simulation
 

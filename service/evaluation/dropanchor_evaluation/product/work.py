@@ -11,8 +11,9 @@ from dropanchor_evaluation.product.runs import TagRun, sources, tag_run
 from dropanchor_evaluation.product.scores import RowScore, TagScore, score, summary
 from dropanchor_evaluation.simulated import batches, merged
 from dropanchor_service.engines.warm_up import warm_up
-from dropanchor_service.estimation.columns import POSE, Array, Engine, SampleBatch
+from dropanchor_service.estimation.columns import POSE, Array, SampleBatch
 from dropanchor_service.estimation.fleet.engine import FleetEngine
+from dropanchor_service.estimation.protocols import Engine
 from dropanchor_service.offline.replay import NS_PER_S, Track
 
 BATCH_S = 0.05
