@@ -19,8 +19,8 @@ from dropanchor_service.api.http.thread import HttpThread
 from dropanchor_service.api.starting import CurrentApp, Gate, create_starting_app
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.checkpoints.thread import CheckpointThread
+from dropanchor_service.engines.compilation import CompilationProgress
 from dropanchor_service.engines.compiled import compiled_engine
-from dropanchor_service.engines.warm_up import CompilationProgress
 from dropanchor_service.estimation.protocols import Engine
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer

@@ -40,7 +40,7 @@ shown("numba with LLVM")
 import dropanchor_service.service
 shown("the modules of the service")
 from dropanchor_service.engines.compiled import compiled_engine
-from dropanchor_service.engines.warm_up import CompilationProgress
+from dropanchor_service.engines.compilation import CompilationProgress
 from dropanchor_service.settings.model import Settings
 compiled_engine(Settings(), CompilationProgress())
 shown("the kernels")

@@ -1,6 +1,7 @@
 """Create the engine that the settings choose."""
 
-from dropanchor_service.engines.warm_up import CompilationProgress, warm_up
+from dropanchor_service.engines.compilation import CompilationProgress
+from dropanchor_service.engines.warm_up import warm_up
 from dropanchor_service.estimation.protocols import Engine
 from dropanchor_service.runtime.kernel_cache import use_kernel_cache
 from dropanchor_service.runtime.processors import usable_processors

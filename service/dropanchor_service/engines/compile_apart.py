@@ -7,7 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from dropanchor_service.engines.warm_up import ESTIMATOR, PROGRESS_S, CompilationProgress, how_often, where_kept
+from dropanchor_service.engines.compilation import PROGRESS_S, CompilationProgress, how_often, where_kept
+from dropanchor_service.engines.warm_up import ESTIMATOR
 from dropanchor_service.runtime.kernel_cache import VARIABLE, has_room, is_full, mark_of
 
 _OF_ONE = 4 << 20  # bytes: more than any kernel has

@@ -1,8 +1,9 @@
 """Compile whatever the service will run, so that no sample waits for it."""
 
 from dropanchor_service.engines.choose import create_engine
+from dropanchor_service.engines.compilation import CompilationProgress
 from dropanchor_service.engines.compile_apart import compile_apart
-from dropanchor_service.engines.warm_up import CompilationProgress, warm_up_answers, warm_up_ingest, warm_up_zones
+from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_ingest, warm_up_zones
 from dropanchor_service.estimation.protocols import Engine
 from dropanchor_service.settings.model import Settings
 

@@ -1,13 +1,5 @@
 """Compile the kernels before they are needed."""
 
-import logging
-import os
-import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any, Final
-
 import numpy as np
 
 from dropanchor_schemas.kinds import KINDS
@@ -25,6 +17,7 @@ from dropanchor_schemas.wire import (
 )
 from dropanchor_schemas.zones import Circle, TooCloseRule, Zone
 from dropanchor_service.answers.answers import Answers
+from dropanchor_service.engines.compilation import CompilationProgress, compiling
 from dropanchor_service.estimation.columns import (
     ANCHOR,
     HEADING,
@@ -47,7 +40,6 @@ from dropanchor_service.ingest.kernels.values import shift_times, time_spans
 from dropanchor_service.ingest.messages import Messages
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.screening import screen
-from dropanchor_service.runtime.kernel_cache import VARIABLE, is_kept
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.arrivals import Arrivals
 from dropanchor_service.store.floors import NO_FLOORS, floors_of
@@ -61,110 +53,10 @@ _DECODER = say("the_decoder", "the decoder of messages")
 _ENCODER = say("the_encoder", "the encoder of answers")
 _ZONES = say("the_zones", "the zones")
 
-PROGRESS_S = 5.0
-IMPORT_BLOCKED: Final[Any] = None  # in sys.modules it makes an import fail
-
-_log = logging.getLogger(__name__)
-
-
-class CompilationProgress:
-    """How far compiling has come. The thread that compiles writes; any thread reads.
-
-    page: URL of the page that shows the progress; "" without one.
-    """
-
-    def __init__(self, page: str = "") -> None:
-        self.page = page
-        self._what = ""
-        self._began_s = 0.0
-
-    def begin(self, what: str) -> None:
-        self._what, self._began_s = what, time.monotonic()
-
-    def end(self) -> None:
-        self._what = ""
-
-    @property
-    def elapsed_s(self) -> float:
-        return time.monotonic() - self._began_s
-
-    @property
-    def sentence(self) -> str:
-        """What the service does before it is ready, for people."""
-        if not self._what:
-            return say("starting", "The service is starting.")
-        return say(
-            "compiling",
-            "The service compiles {what}: {seconds} s so far. {often}.",
-            what=self._what,
-            seconds=f"{self.elapsed_s:.0f}",
-            often=how_often(),
-        )
-
-
-def how_often() -> str:
-    """Return how often the kernels are compiled, for people."""
-    if is_kept():
-        return say("compiled_once", "This happens once after an update")
-    return say("compiled_always", "This happens at every start; the log says why")
-
-
-def where_kept() -> str:
-    """Return where the compiled kernels are kept, as the end of a sentence."""
-    return f"; the result is cached in {os.environ.get(VARIABLE)}" if is_kept() else ""
-
-
-@contextmanager
-def _compiling(what: str, progress: CompilationProgress) -> Iterator[None]:
-    """Log and note the progress of compiling, because a minute of silence looks like a fault.
-
-    The level is WARNING, so that the lines appear at any usual log level.
-    """
-    from numba.core.event import Event, Listener, install_listener
-
-    class Progress(Listener):
-        """Receives an event for each of hundreds of functions."""
-
-        has_begun = False
-        logged = 0.0
-
-        def on_start(self, event: Event) -> None:  # noqa: ARG002
-            if not self.has_begun:
-                self.has_begun, self.logged = True, time.monotonic()
-                progress.begin(what)
-                shown = f"; {progress.page} shows the progress" if progress.page else ""
-                _log.warning("compiling %s; please wait. %s%s", what, how_often(), shown)
-            elif time.monotonic() - self.logged >= PROGRESS_S:
-                self.logged = time.monotonic()
-                _log.warning("compiling: %.0f s so far", progress.elapsed_s)
-
-        def on_end(self, event: Event) -> None: ...
-
-    listener = Progress()
-    with _without_blas(), install_listener("numba:compile", listener):
-        yield
-    if listener.has_begun:
-        _log.warning("compiled in %.0f s%s", progress.elapsed_s, where_kept())
-        progress.end()
-
-
-@contextmanager
-def _without_blas() -> Iterator[None]:
-    """Keep numba from importing scipy.linalg, where it looks for BLAS.
-
-    No kernel here calls BLAS. The import would cost every start 0.2 s of processor time and 14 MB of memory.
-    """
-    found = sys.modules.setdefault("scipy.linalg", IMPORT_BLOCKED)
-    try:
-        yield
-    finally:
-        if found is IMPORT_BLOCKED:
-            del sys.modules["scipy.linalg"]
-
 
 def warm_up(engine: Engine, progress: CompilationProgress | None = None) -> None:
     """Compile the kernels of `engine` with two seconds of a tag that moves off. Discard `engine` afterwards."""
-    with _compiling(ESTIMATOR, progress or CompilationProgress()):
+    with compiling(ESTIMATOR, progress or CompilationProgress()):
         _run(engine)
         _judge_sensors()
 
@@ -188,7 +80,7 @@ def warm_up_belief() -> None:
 
     rows, nodes, beliefs = np.zeros(1, ROW), np.zeros(1, NODE), np.zeros(1, BELIEF)
     pool, anchors = make_pool(MAX_HYPOTHESES), np.zeros(0, ANCHOR)
-    with _compiling(ESTIMATOR, CompilationProgress()):
+    with compiling(ESTIMATOR, CompilationProgress()):
         advance(rows, pool, nodes, anchors, Tuning().record(), make_workspace(), beliefs)
 
 
@@ -198,7 +90,7 @@ def warm_up_front_end() -> None:
 
     engine, samples = FleetEngine(), _moving_off(1)
     first = SampleBatch(imu=samples.imu[:1], ranges=samples.ranges[:0], headings=samples.headings[:0])
-    with _compiling("the front-end of the estimator", CompilationProgress()):
+    with compiling("the front-end of the estimator", CompilationProgress()):
         engine.set_anchors(np.zeros(1, ANCHOR))
         engine.configure(0, default_settings())
         engine.process(first)
@@ -244,7 +136,7 @@ def warm_up_ingest(progress: CompilationProgress | None = None) -> None:
         boot_clock=True,
     )
     payloads = [encode_packed(frame.replaced(sequence=number)) for number in (0, 2)]
-    with _compiling(_DECODER, progress or CompilationProgress()):
+    with compiling(_DECODER, progress or CompilationProgress()):
         for batch in (payloads, payloads[:1]):
             _ingest(batch)
 
@@ -280,7 +172,7 @@ def warm_up_answers(progress: CompilationProgress | None = None) -> None:
     poses["t_ns"] = [0, answers.now_ns()]
     poses["state"], hypotheses["row"] = State.AMBIGUOUS, 1
     answers.latest.write(poses, hypotheses)
-    with _compiling(_ENCODER, progress or CompilationProgress()):
+    with compiling(_ENCODER, progress or CompilationProgress()):
         b"".join(answers.pose_list_json())
 
 
@@ -289,7 +181,7 @@ def warm_up_zones(progress: CompilationProgress | None = None) -> None:
     poses, names = np.zeros(2, POSE), ["a", "b"]
     poses["row"], poses["t_ns"], poses["state"], poses["p_mode"] = (0, 1), 1, State.TRACKING, 1.0
     poses["cov"][:, :2, :2] = np.eye(2)
-    with _compiling(_ZONES, progress or CompilationProgress()):
+    with compiling(_ZONES, progress or CompilationProgress()):
         found = placed(poses, np.zeros(2), LatestPoses())
         zones = ZoneWatch()
         zones.set_zones([Zone(id="a", shape=Circle(type="circle", x=0.0, y=0.0, radius_m=9.0))], Groups())

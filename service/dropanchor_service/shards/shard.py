@@ -13,8 +13,8 @@ from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.cluster import leases
 from dropanchor_service.cluster.database import DatabaseError, connect
 from dropanchor_service.cluster.leases import Claimant
+from dropanchor_service.engines.compilation import CompilationProgress
 from dropanchor_service.engines.compiled import compiled_engine
-from dropanchor_service.engines.warm_up import CompilationProgress
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.metrics.registry import Metrics

@@ -13,7 +13,7 @@ from dropanchor_schemas.site import Anchor, Site
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.api.starting import create_starting_app
-from dropanchor_service.engines.warm_up import CompilationProgress
+from dropanchor_service.engines.compilation import CompilationProgress
 from dropanchor_service.estimation.columns import State, StateReason
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator

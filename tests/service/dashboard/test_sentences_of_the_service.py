@@ -24,7 +24,7 @@ from dropanchor_service.cluster import sentences as of_cluster
 from dropanchor_service.cluster.tenure import Standing, Tenure
 from dropanchor_service.cluster.watch import Lease, obstacle
 from dropanchor_service.delivery.registry import NO_DESTINATIONS
-from dropanchor_service.engines.warm_up import CompilationProgress
+from dropanchor_service.engines.compilation import CompilationProgress
 from dropanchor_service.events import database as of_events
 from dropanchor_service.history.sqlite import store as of_history
 from dropanchor_service.node import sentences as of_node

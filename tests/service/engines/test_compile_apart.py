@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from dropanchor_service.engines.compilation import CompilationProgress
 from dropanchor_service.engines.compile_apart import compile_apart, mark_complete
-from dropanchor_service.engines.warm_up import CompilationProgress
 from dropanchor_service.runtime import kernel_cache
 from dropanchor_service.runtime.kernel_cache import VARIABLE, is_full, mark_of
 from service.data_folder import full_disk

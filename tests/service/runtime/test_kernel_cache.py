@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 import pytest
 
-from dropanchor_service.engines.warm_up import CompilationProgress
+from dropanchor_service.engines.compilation import CompilationProgress
 from dropanchor_service.runtime import kernel_cache
 from dropanchor_service.runtime.kernel_cache import TEMPORARY, VARIABLE, use_kernel_cache
 from service.data_folder import NOBODY, full_disk, without_rights
