@@ -29,6 +29,10 @@ _NAME = re.compile(rf"(?:unread-)?{_PREFIX}(\d+)(?:-since-(\d+))?")
 INSTEAD = say("checkpoint_before", "the one before is used, or else all tags start afresh")
 
 
+class _ContinuesNothingError(CheckpointError):
+    """A checkpoint may be whole, but not the one that it continues."""
+
+
 class _File(NamedTuple):
     """number: the newest has the highest. since: number of the whole checkpoint that this one continues, or is."""
 
@@ -94,6 +98,8 @@ class CheckpointFolder:
                 return self._read(file), complaints
             except UnreadableLayoutError as error:
                 complaints.append(f"{file.path.name} is not used: {error}; {_put_aside(file.path)}")
+            except _ContinuesNothingError as error:
+                complaints.append(f"{file.path.name} is not used: {error}")
             except (OSError, CheckpointError) as error:
                 complaints.append(f"{file.path.name} is not used: {error}")
                 self._recovery.set_aside(file.path, DAMAGED, INSTEAD, f"{_PREFIX}*")
@@ -102,7 +108,12 @@ class CheckpointFolder:
     def _read(self, file: _File) -> Snapshot:
         """Raises OSError and CheckpointError."""
         whole = self._folder / f"{_PREFIX}{file.since:012d}"
-        layout, snapshot = decoded(whole.read_bytes())
+        try:
+            layout, snapshot = decoded(whole.read_bytes())
+        except (OSError, CheckpointError) as error:
+            if file.path == whole:
+                raise
+            raise _ContinuesNothingError(f"{whole.name}, which it continues, cannot be used: {error}") from error
         if file.path != whole:
             snapshot = applied(snapshot, file.path.read_bytes())
         return self._as_present(layout, snapshot)

@@ -126,7 +126,17 @@ def test_without_the_whole_one_those_that_continue_it_are_not_used(tmp_path: Pat
         folder.write(snapshot(value))
     whole = tmp_path / "checkpoint-000000000002"
     whole.write_bytes(whole.read_bytes()[:-1])
-    assert value_in(folder_of(tmp_path)) == 1
+    found, complaints = folder_of(tmp_path).newest()
+    assert found is not None
+    assert found.document["value"] == 1
+    continuing = "checkpoint-000000000003-since-000000000002"
+    damaged = "it is damaged (its checksum is wrong)"
+    assert complaints == [
+        f"{continuing} is not used: {whole.name}, which it continues, cannot be used: {damaged}",
+        f"{whole.name} is not used: {damaged}",
+    ]
+    assert (tmp_path / continuing).exists(), "it is not damaged itself"
+    assert not whole.exists()
 
 
 def test_a_checkpoint_of_another_layout_is_kept_under_another_name(tmp_path: Path) -> None:
