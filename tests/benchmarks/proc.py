@@ -28,6 +28,12 @@ def resident_bytes(pid: int) -> int:
     return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
+def written_bytes(pid: int) -> int:
+    """Return how many bytes a process has had written to disks so far."""
+    lines = Path(f"/proc/{pid}/io").read_text().splitlines()
+    return int(next(line.split(": ")[1] for line in lines if line.startswith("write_bytes")))
+
+
 def load() -> float:
     """Return the load average of the last minute."""
     return os.getloadavg()[0]

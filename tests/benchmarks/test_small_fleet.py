@@ -84,15 +84,17 @@ def test_the_cost_of_ten_sites_with_five_tags_each(tmp_path: Path) -> None:
         for fleet in fleets:
             fleet.send_line(time.time_ns() + 300_000_000)
         time.sleep(SETTLE_S)
+        written, began_s = proc.written_bytes(pid), time.monotonic()
         cpu, bare_cpu = cores_in_use(pid, bare)
+        worn = (proc.written_bytes(pid) - written) / (time.monotonic() - began_s)
         moving_mb = proc.resident_bytes(pid) / 1e6
         sent, _ = (json.loads(fleet.request("end")) for fleet in fleets)
         missing = lost(sent["messages"], before, when_quiet(lambda: counters(service)))
     report.record(
         "small",
         f"Without tags: {idle * 100:.2f} % of a core, {idle_mb:.0f} MB resident. {TAGS} tags in {len(SITES)} sites: "
-        f"{cpu:.3f} of a core, {moving_mb:.0f} MB, {missing} samples lost. A program that receives the same messages "
-        f"and drops them: {bare_cpu:.3f} of a core.\n\n" + floor(),
+        f"{cpu:.3f} of a core, {moving_mb:.0f} MB, {worn / 1e3:.0f} kB/s written, {missing} samples lost. A program "
+        f"that receives the same messages and drops them: {bare_cpu:.3f} of a core.\n\n" + floor(),
     )
     assert missing == 0
 

@@ -12,7 +12,7 @@ from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.runtime.worker import Worker
 
 OLD_S = 5.0  # a newest checkpoint that is so much older than the pause is a problem
-WEAR_BYTES_S = 70_000  # a pause is so long that no more is written in a second, so that a card lives for years
+WEAR_BYTES_S = 70_000  # a pause is so long that no more is written in a second: 2 TB a year spare a memory card
 LONGEST_S = 6.0  # pause because of that: what tags without a cache send in a pause is lost if the service is killed
 REST = 3  # pause, relative to the duration of the last write, so that a slow disk is not always busy
 FIRST_S = 0.25  # pause before the first: of a tag that no checkpoint has, the caches are asked for 100 messages only

@@ -165,7 +165,7 @@ class Settings(_Section):
     checkpoint_s: Annotated[float, Field(gt=0, le=3600)] = Field(
         default=1.0,
         description="Time between checkpoints: what a killed service has to fetch again. It is longer, up to 6 s, "
-        "while many tags move, so that a memory card lives for years.",
+        "while many tags move, which spares memory cards.",
     )
     unknown_tags: UnknownTags = Field(
         default="accept",
