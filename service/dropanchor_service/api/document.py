@@ -14,6 +14,7 @@ from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.tag_health import TagHealthMessage
 from dropanchor_service.api.http.errors import MEDIA_TYPE, TYPE_PREFIX, Kind, problems
 from dropanchor_service.api.http.permissions import OPEN_PATHS
+from dropanchor_service.api.http.site_in_path import knows_no_422
 from dropanchor_service.api.request_models import separate_requests
 
 _KINDS_IN = re.compile(f"`{TYPE_PREFIX}([a-z-]+)`")
@@ -59,6 +60,8 @@ def _add_access(document: dict[str, Any]) -> None:
     refusals = {str(status): response for status, response in problems(*_REFUSALS).items()}
     for path, operations in document["paths"].items():
         for operation in operations.values() if path not in OPEN_PATHS else ():
+            if knows_no_422(path):
+                operation["responses"]["400"] = operation["responses"].pop("422")
             operation["responses"] = dict(sorted((operation["responses"] | refusals).items()))
             operation["security"] = [{"bearer": []}, {}]
 

@@ -12,7 +12,7 @@ from starlette.responses import Response
 from starlette.routing import Match
 
 from dropanchor_schemas.sentences import Sentence, phrase_of, said_by, say
-from dropanchor_service.api.http.site_in_path import is_omlox
+from dropanchor_service.api.http.site_in_path import is_omlox, knows_no_422
 
 MEDIA_TYPE = "application/problem+json"
 TYPE_PREFIX = "urn:dropanchor:problem:"
@@ -121,8 +121,8 @@ def problem_response(
     path, phrase = _path(request), phrase_of(detail)
     if kind in (Kind.NOT_READY, Kind.BUSY):
         headers = {"retry-after": "1", **(headers or {})}
+    status = 400 if status == 422 and knows_no_422(path) else status
     if is_omlox(path):
-        status = 400 if status == 422 else status  # the standard knows no 422
         members = {"code": status, "message": detail} | dict(members or {})
     elif phrase is not None:
         members = {"detail_phrase": phrase} | dict(members or {})

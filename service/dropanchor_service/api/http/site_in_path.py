@@ -7,6 +7,7 @@ OMLOX_PREFIX = "/omlox/"
 """Begin of the paths of the omlox interface of an only site; those of one of several stand below `/sites/SITE`."""
 
 _PREFIX = "/api/v1"
+_FEATURES = f"{_PREFIX}/ogc"
 _OF_SITE = re.compile(f"({_PREFIX}|)/sites/([^/]+)(/.*)", re.DOTALL)
 
 
@@ -21,3 +22,8 @@ def divided(path: str) -> tuple[str | None, str]:
 def is_omlox(path: str) -> bool:
     """Return whether a path is of the omlox interface."""
     return path.startswith(OMLOX_PREFIX) or (path.startswith("/sites/") and divided(path)[0] is not None)
+
+
+def knows_no_422(path: str) -> bool:
+    """Return whether the standard of this interface, omlox or OGC API – Features, wants 400 for what is not valid."""
+    return is_omlox(path) or (divided(path)[1] + "/").startswith(f"{_FEATURES}/")

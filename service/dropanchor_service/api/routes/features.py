@@ -1,11 +1,10 @@
 """The routes of OGC API – Features, Part 1 (OGC 17-069r4): tags, zones and tracks for any program of maps."""
 
 import re
-from enum import StrEnum
 from typing import Annotated, Any
-from urllib.parse import quote, urlencode
+from urllib.parse import quote, unquote, urlencode
 
-from fastapi import Path, Query, Request
+from fastapi import Depends, Path, Query, Request
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
@@ -27,19 +26,30 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.contents import schema_of
 from dropanchor_service.api.routes.feature_collections import COLLECTIONS, Span, box_of, features_of
-from dropanchor_service.api.routes.parameters import NO_QUERY, id_of, json_response
+from dropanchor_service.api.routes.parameters import NO_QUERY, json_response
 from dropanchor_service.api.routes.period import reading_history
 from dropanchor_service.api.routes.site_of_request import parts_of
 
 CRS84 = "http://www.opengis.net/def/crs/OGC/1.3/CRS84"
 CONFORMS_TO = [f"http://www.opengis.net/spec/ogcapi-features-1/1.0/conf/{name}" for name in ("core", "geojson")]
+MAX_LIMIT = 10_000
 _ROOT = "/ogc"
 _OF_SITE = re.compile(r"/api/v1(/sites/[^/]+(?=/ogc))?")
 _NUMBER = r"-?[0-9]{1,9}(\.[0-9]{1,20})?"
-_READS = (Kind.NOT_GEOREFERENCED, Kind.NO_HISTORY, Kind.HISTORY_UNREADABLE, Kind.INVALID_REQUEST)
+_READS = (Kind.NOT_FOUND, Kind.NOT_GEOREFERENCED, Kind.NO_HISTORY, Kind.HISTORY_UNREADABLE, Kind.INVALID_REQUEST)
 
-CollectionName = StrEnum("CollectionName", {name: name for name in COLLECTIONS})  # type: ignore[misc]
-InCollection = Annotated[CollectionName, Path(description="The id of the collection.")]
+
+async def _collection_id(
+    collection: Annotated[
+        str, Path(description="The id of the collection.", json_schema_extra={"enum": list(COLLECTIONS)})
+    ],
+) -> str:
+    if collection not in COLLECTIONS:
+        raise ProblemError(Kind.NOT_FOUND, f"There is no such collection; there are: {', '.join(COLLECTIONS)}.")
+    return collection
+
+
+InCollection = Annotated[str, Depends(_collection_id)]
 ItemId = Annotated[
     str,
     Path(description="The id of the tag or zone, percent-escaped.", json_schema_extra=ID_SCHEMA, examples=["tag-1"]),
@@ -53,7 +63,9 @@ def _times_of(text: str) -> Span:
 
 
 def _require_times(text: str) -> str:
-    _times_of(text)
+    begin, end = _times_of(text)
+    if begin is not None and end is not None and end < begin:
+        raise ValueError("ends before it begins")
     return text
 
 
@@ -76,7 +88,12 @@ class ItemsQuery(BaseModel):
         "Tags by their latest pose; of tracks, the part in between, by default the last hour.",
         examples=["2027-01-15T08:00:00Z/.."],
     )
-    limit: int = Field(default=1000, ge=1, le=10_000, description="The maximum number of features on a page.")
+    limit: Annotated[int, AfterValidator(lambda limit: min(limit, MAX_LIMIT))] = Field(
+        default=1000,
+        ge=1,
+        json_schema_extra={"maximum": MAX_LIMIT},
+        description="The maximum number of features on a page. More than the largest stand for the largest.",
+    )
     offset: int = Field(default=0, ge=0, lt=2**31, description="How many features to leave out: see the link `next`.")
 
 
@@ -136,7 +153,7 @@ def list_feature_collections(request: Request) -> Response:
     f"{_ROOT}/collections/{{collection}}",
     summary="Get a collection of features",
     response_model=FeatureCollectionInfo,
-    responses=problems(Kind.INVALID_REQUEST),
+    responses=problems(Kind.NOT_FOUND, Kind.INVALID_REQUEST),
     dependencies=[NO_QUERY],
 )
 def get_feature_collection(collection: InCollection, request: Request) -> Response:
@@ -170,11 +187,11 @@ def list_features(collection: InCollection, query: Annotated[ItemsQuery, Query()
     f"{_ROOT}/collections/{{collection}}/items/{{item}}",
     summary="Get a feature of a collection",
     response_class=Response,
-    responses=_offers(FeatureItemAlone) | problems(Kind.NOT_FOUND, *_READS),
+    responses=_offers(FeatureItemAlone) | problems(*_READS),
     dependencies=[NO_QUERY],
 )
 def get_feature(collection: InCollection, item: ItemId, request: Request) -> Response:
-    name = id_of(item)
+    name = unquote(item)
     for feature in _read(request, collection):
         if feature["id"] == name:
             path = f"{_ROOT}/collections/{collection}"
