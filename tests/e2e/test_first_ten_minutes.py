@@ -63,6 +63,7 @@ def test_the_lines_of_the_readme_do_what_it_says(tmp_path: Path) -> None:
     starting = [one for one in scripts if re.search("make |dropanchor serve", one.text)]  # they run until stopped
     assert [one.text.splitlines()[0].split()[0] for one in starting] == ["make", SERVE, SERVE]
     lines = [line for one in scripts if one not in starting for line in one.text.splitlines()]
+    needed = "A position needs about 20 s of ranges and of motion samples"
     with running_service("--data-dir", str(tmp_path / "FOLDER")) as service:
         (tmp_path / "tag.py").write_text(program.text.replace("tcp/127.0.0.1:7447", service.zenoh))
         send = ".venv/bin/python tag.py"
@@ -72,15 +73,16 @@ def test_the_lines_of_the_readme_do_what_it_says(tmp_path: Path) -> None:
         elsewhere |= {f" record {action}": f" record {action} --url {service.url}" for action in ("start", "stop")}
         said = ""
         for line in lines:
-            if "curl" in line:  # a person takes longer to type it
+            if "curl" in line:  # a person takes longer to type it than the tag sends
                 wait_until(lambda: service.ask("GET", "/api/v1/tags/forklift-7/track").json().get("poses"))
+                wait_until(lambda: needed in service.get("/api/v1/tags/forklift-7/pose")["hint"])
             for usual, other in elsewhere.items():
                 line = line.replace(usual, other)
             said += run(line, tmp_path)
             if "record start" in line:
                 run(send, tmp_path)
     assert '"state":"initialising"' in said
-    assert "A position needs about 20 s of ranges and of motion samples" in said
+    assert needed in said
     assert re.search(r"t_ns,t_utc,.*\n\d+,", said)
     assert "forklift-7: 1 poses" in said
 

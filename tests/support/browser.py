@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Error, Page, expect, sync_playwright
 
 from support.patience import PATIENCE_S
 
@@ -85,6 +85,28 @@ class PausedBrowser:
             asyncio._set_running_loop(None)
 
 
+def wait_for_truth(page: Page, expression: str, timeout_s: float, seen: Callable[[], object]) -> None:
+    """Wait until a JavaScript expression is true. One that cannot be evaluated yet, such as of a list's last, is not.
+
+    It is evaluated from outside, since the content security policy forbids it inside the page. seen: what else is
+    told when it does not become true.
+    """
+    end_s = time.monotonic() + timeout_s
+    while said := _untruth(page, expression):
+        if time.monotonic() > end_s:
+            raise AssertionError(f"not within {timeout_s} s: {expression}: {said}; the page: {seen()}")
+        page.wait_for_timeout(50)
+
+
+def _untruth(page: Page, expression: str) -> str:
+    """Return nothing if the expression is true, or else its value or its error."""
+    try:
+        value = page.evaluate(expression)
+    except Error as error:
+        return str(error)
+    return "" if value else f"it is {value!r}"
+
+
 @dataclass
 class WatchedPage:
     """A page, and the errors and warnings that it logged."""
@@ -104,16 +126,9 @@ class WatchedPage:
         return {tag["tag"]: tag for tag in tags}
 
     def wait_for(self, condition: str, timeout_s: float = PATIENCE_S) -> None:
-        """Wait until a JavaScript expression is true.
-
-        The expression is evaluated from outside, since the content security policy forbids it inside the page.
-        """
-        end_s = time.monotonic() + timeout_s
-        while not self.page.evaluate(condition):
-            if time.monotonic() > end_s:
-                status = self.page.evaluate("window.dropanchor?.status?.()")
-                raise AssertionError(f"not within {timeout_s} s: {condition}; status: {status}, errors: {self.errors}")
-            self.page.wait_for_timeout(50)
+        """Wait until a JavaScript expression is true."""
+        status = "window.dropanchor?.status?.()"
+        wait_for_truth(self.page, condition, timeout_s, lambda: (self.page.evaluate(status), self.errors))
 
     def wait_for_map(self, visible: int) -> None:
         """Wait until the site is loaded, `visible` tags are on the map, and the map has stopped moving."""

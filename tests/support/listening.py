@@ -25,6 +25,10 @@ class ReceivedFrames:
         self.frames.append(frame)
         self.keys.append(str(message.key_expr))
 
+    def of(self, tag: str) -> list[Frame]:
+        """Return the frames of one tag."""
+        return [frame for key, frame in zip(self.keys, self.frames, strict=False) if tag in key.split("/")]
+
     def ranges(self) -> list[float]:
         """Return all received ranges in m."""
         return [sample.range_m for frame in self.frames for sample in frame.ranges]

@@ -1,6 +1,5 @@
 """The page of a tag in a real browser, with sensors, a serial port and a Bluetooth module that the test plays."""
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -8,6 +7,7 @@ from typing import Any
 
 from playwright.sync_api import Browser, Page
 
+from support.browser import wait_for_truth
 from support.patience import PATIENCE_S
 
 PHONE = (390, 844)
@@ -127,15 +127,9 @@ class TagPage:
         return counts
 
     def wait_for(self, condition: str, timeout_s: float = PATIENCE_S) -> None:
-        """Wait until a JavaScript expression is true; `counts` in it are the numbers of samples.
-
-        The expression is evaluated from outside, since the content security policy forbids it inside the page.
-        """
+        """Wait until a JavaScript expression is true; `counts` in it are the numbers of samples."""
         script = f"() => {{ const counts = window.dropanchor?.counts() ?? {{}}; return ({condition}); }}"
-        end_s = time.monotonic() + timeout_s
-        while not self.page.evaluate(script):
-            assert time.monotonic() < end_s, f"not within {timeout_s} s: {condition}; the page: {self.text('live')}"
-            self.page.wait_for_timeout(50)
+        wait_for_truth(self.page, script, timeout_s, lambda: self.text("live"))
 
     def text(self, element: str) -> str:
         return self.page.locator(f"#{element}").inner_text()

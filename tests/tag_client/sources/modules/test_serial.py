@@ -206,15 +206,12 @@ def test_an_imu_is_published_in_the_axes_of_the_tag_with_a_hint_if_they_are_wron
         listening(router_endpoint) as received,
         plugged_in(tmp_path / "port", talkative(said.NODEFRAME2), 921_600, period_s=0.01) as module,
     ):
-        options = ("--tag", "a", "--module", "linktrack")
-        with serial(router_endpoint, module, *options) as process:
+        with serial(router_endpoint, module, "--tag", "a", "--module", "linktrack") as process:
             errors = process.stderr
             assert errors is not None
             wait_until(lambda: "start again with --up=y" in errors.readline())
-        received.frames.clear()
-        with serial(router_endpoint, module, *options, "--up", "y"):
-            wait_until(lambda: any(frame.imu for frame in received.frames))
-        acc = [sample.acc for frame in received.frames for sample in frame.imu][-1]
+        with serial(router_endpoint, module, "--tag", "b", "--module", "linktrack", "--up", "y"):
+            acc = wait_until(lambda: [one.acc for frame in received.of("b") for one in frame.imu])[0]
     assert acc == pytest.approx((0.22494, 0.05504, 9.73712), abs=1e-4)
 
 
