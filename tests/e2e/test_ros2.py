@@ -22,13 +22,17 @@ from support.vibration import shaken_acc, shaken_gyro
 from support.zenoh_router import connected_session, free_endpoint, running_router, wait_until
 
 TAG, DOMAIN, SPEED_MPS = "cart", 7, 1.0
+TAGS = [TAG, "dds-cart"]
 OPTIONS = ("--imu=/imu/data", "--forward=y", "--range=/uwb/range=7", "--namespace=cart/dropanchor")
 
 
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
-    config = settings_file(tmp_path_factory.mktemp("site"), [TAG])
-    config.write_text(config.read_text().replace(f'[tags."{TAG}"]', f'[tags."{TAG}"]\nheight_m = 0.2'))
+    config = settings_file(tmp_path_factory.mktemp("site"), TAGS)
+    text = config.read_text()
+    for tag in TAGS:
+        text = text.replace(f'[tags."{tag}"]', f'[tags."{tag}"]\nheight_m = 0.2')
+    config.write_text(text)
     with running_service("--config", str(config)) as running:
         yield running
 
@@ -81,9 +85,13 @@ def driving(robot: Robot) -> Iterator[None]:
         yield
 
 
-def test_a_robot_is_a_tag_and_gets_its_pose_with_covariance_odometry_and_tf(service: Running, ros_router: str) -> None:
-    with connected_session(ros_router) as session, running_bridge(service, ros_router, *OPTIONS) as said:
-        robot = Robot(session, DOMAIN)
+@pytest.mark.parametrize(("tag", "dds"), [(TAGS[0], []), (TAGS[1], ["--dds"])], ids=["rmw_zenoh", "DDS"])
+def test_a_robot_is_a_tag_and_gets_its_pose_with_covariance_odometry_and_tf(
+    service: Running, ros_router: str, tag: str, dds: list[str]
+) -> None:
+    options = [*OPTIONS, "--tag", tag, *dds]
+    with connected_session(ros_router) as session, running_bridge(service, ros_router, *options) as said:
+        robot = Robot(session, DOMAIN, dds=bool(dds))
         keys = [
             robot.subscribe("cart/dropanchor/pose", POSE),
             robot.subscribe("cart/dropanchor/odometry", ODOMETRY),
@@ -97,7 +105,7 @@ def test_a_robot_is_a_tag_and_gets_its_pose_with_covariance_odometry_and_tf(serv
         t_ns, frame = reader.stamp_and_frame()
         place, heading, covariance = read_pose(reader)
         reader.end()
-        stored = service.get(f"/api/v1/tags/{TAG}/pose?at={t_ns}")
+        stored = service.get(f"/api/v1/tags/{tag}/pose?at={t_ns}")
         assert frame == "site"
         assert hypot(place[0] - stored["x"], place[1] - stored["y"]) < 0.05
         assert place[2] == 0.2
@@ -106,7 +114,7 @@ def test_a_robot_is_a_tag_and_gets_its_pose_with_covariance_odometry_and_tf(serv
 
         reader = CdrReader(odometry[-1][0])
         assert reader.stamp_and_frame()[1] == "site"
-        assert reader.text() == f"tag/{TAG}"
+        assert reader.text() == f"tag/{tag}"
         read_pose(reader)
         twist = reader.take("d", 6)
         assert reader.take("d", 36)[::7] == [1e6] * 6  # not known
@@ -116,7 +124,7 @@ def test_a_robot_is_a_tag_and_gets_its_pose_with_covariance_odometry_and_tf(serv
 
         reader = CdrReader(tf[-1][0])
         assert reader.take("I") == [1]
-        assert (reader.stamp_and_frame()[1], reader.text()) == ("site", f"tag/{TAG}")
+        assert (reader.stamp_and_frame()[1], reader.text()) == ("site", f"tag/{tag}")
         assert hypot(*reader.take("d", 3)) < 40.0
         assert hypot(*reader.take("d", 4)) == pytest.approx(1.0)
         reader.end()
@@ -129,7 +137,7 @@ def test_a_robot_is_a_tag_and_gets_its_pose_with_covariance_odometry_and_tf(serv
         assert abs(heading - pi / 2) < 0.7
     assert any("a range that is not finite" in line for line in said)
     told = [line.strip() for line in said if "published" in line]
-    assert f"no pose is published: the service has none of tag {TAG}" in told[0]
+    assert f"no pose is published: the service has none of tag {tag}" in told[0]
     assert told[-1].endswith("poses are published")
     assert "samples sent" in said[-1]
 

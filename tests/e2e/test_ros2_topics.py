@@ -1,5 +1,6 @@
 """`dropanchor ros2` beside nodes that publish something else: other topics, other types, another distribution."""
 
+import math
 import signal
 import subprocess
 import time
@@ -13,7 +14,7 @@ import zenoh
 from support.commands import environment
 from support.listening import listening
 from support.patience import PATIENCE_S
-from support.ros2 import IMU, RANGE, CdrWriter, Robot, imu_cdr
+from support.ros2 import IMU, RANGE, CdrWriter, Robot, imu_cdr, odometry_cdr, range_cdr
 from support.service import command
 from support.zenoh_router import connected_session, free_endpoint, free_port, running_router, wait_until
 
@@ -80,6 +81,44 @@ def test_nodes_of_humble_are_read_and_named_and_accelerations_that_are_all_zero_
     assert {round(one.acc[2], 3) for frame in heard.frames for one in frame.imu} == {9.8}
     assert sum("these nodes run ROS 2 Humble" in line for line in said) == 1
     assert "7 samples sent; left out: 1 × an IMU message whose linear_acceleration is 0 along all axes" in said[-1]
+
+
+def test_nodes_behind_a_bridge_to_dds_are_read_and_see_what_is_published(router: str) -> None:
+    options = ("--dds=/bot", "--imu=/imu/data", "--range=/uwb/range=7", "--odometry=/odom=90", "--pressure=/air")
+    with (
+        listening(router) as heard,
+        connected_session(router) as session,
+        bridge(router, *options) as said,
+    ):
+        robot = Robot(session, dds=True)
+        token = f"@/{session.info.zid()}/@ros2_lv/MP/bot§mag/sensor_msgs§msg§MagneticField/:1:0:0,10"
+        kept = session.liveliness().declare_token(token)
+        wait_until(lambda: any("/MS/bot§air/" in token for token in robot.tokens()))  # the last that it declares
+        t_ns = time.time_ns()
+        robot.publish("bot/imu/data", "", imu_cdr(t_ns, (0, 0, 9.8), (0, 0, 0.1)))
+        robot.publish("imu/data", "", imu_cdr(t_ns, (0, 0, 9.7), (0, 0, 0.1)))  # of another robot
+        for cdr in (range_cdr(t_ns, 3.5), humble_range_cdr(t_ns + 1000, 4.5), b"", range_cdr(t_ns, 5.5)[:-6]):
+            robot.publish("bot/uwb/range", "", cdr)
+        half = math.radians(30.0) / 2
+        robot.publish("bot/odom", "", odometry_cdr(t_ns, (0, 0, math.sin(half), math.cos(half)), 0.0625))
+        robot.publish("bot/odom", "", odometry_cdr(t_ns, (0, 0, 0, 0)))
+        wait_until(lambda: sum(len(one.imu) + len(one.ranges) + len(one.headings) for one in heard.frames) == 4)
+        wait_for(said, "no message of /air comes: no node publishes it. These are published: /mag (sensor_msgs/msg/Mag")
+        tokens = {token.partition("@ros2_lv")[2] for token in robot.tokens()}
+        kept.undeclare()
+    assert {
+        "",
+        "/MS/bot§imu§data/sensor_msgs§msg§Imu/:1:0:0,10",
+        "/MP/bot§dropanchor§pose/geometry_msgs§msg§PoseWithCovarianceStamped/:1:0:0,10",
+        "/MP/bot§tf/tf2_msgs§msg§TFMessage/:1:0:0,10",
+    } < tokens
+    ranges = [(one.anchor, one.range_m) for frame in heard.frames for one in frame.ranges]
+    (heading,) = (one for frame in heard.frames for one in frame.headings)
+    assert sorted(ranges) == [(7, 3.5), (7, 4.5)]
+    assert heading.heading_rad == pytest.approx(math.radians(120))
+    assert heading.std_rad == pytest.approx(0.25)
+    assert "4 samples sent; left out: 2 × a damaged sensor_msgs/msg/Range" in said[-1]
+    assert "1 × an odometry message whose orientation is no rotation" in said[-1]
 
 
 def test_of_a_silent_topic_it_is_told_what_is_published_instead_and_when_it_comes(router: str) -> None:

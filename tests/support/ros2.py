@@ -1,4 +1,7 @@
-"""CDR and rmw_zenoh as a robot speaks them, written from their specifications and apart from the code under test."""
+"""CDR, rmw_zenoh and zenoh-bridge-ros2dds as a robot speaks them, apart from the code under test.
+
+They are written from their specifications and sources.
+"""
 
 import math
 import struct
@@ -96,6 +99,12 @@ def pressure_cdr(t_ns: int, pressure_pa: float) -> bytes:
     return CdrWriter().header(t_ns, "barometer").add("d", pressure_pa, 0.0).cdr
 
 
+def odometry_cdr(t_ns: int, quaternion: tuple[float, ...], yaw_variance: float = 0.0) -> bytes:
+    """Return a nav_msgs/Odometry. quaternion: x, y, z, w."""
+    writer = CdrWriter().header(t_ns, "odom").text("base_link").add("d", 0, 0, 0, *quaternion)
+    return writer.add("d", *[0] * 35, yaw_variance).add("d", *[0] * 42).cdr
+
+
 def read_pose(reader: CdrReader) -> tuple[list[float], float, list[float]]:
     """Return position, heading and covariance (36) of a geometry_msgs/PoseWithCovariance."""
     x, y, z, qx, qy, qz, qw = reader.take("d", 7)
@@ -105,21 +114,31 @@ def read_pose(reader: CdrReader) -> tuple[list[float], float, list[float]]:
 
 @dataclass
 class Robot:
-    """A robot with a session of its own at the router of its nodes. received: of each key, payload and attachment."""
+    """A robot with a session of its own at the router of its nodes. received: of each key, payload and attachment.
+
+    dds: its nodes use DDS, and the session is that of zenoh-bridge-ros2dds.
+    """
 
     session: zenoh.Session
     domain: int = 0
     received: dict[str, list[tuple[bytes, bytes]]] = field(default_factory=dict)
     sequence: int = 0
+    dds: bool = False
+
+    def key(self, topic: str, of: str) -> str:
+        return topic if self.dds else f"{self.domain}/{topic}/{of}"
 
     def publish(self, topic: str, of: str, cdr: bytes, t_ns: int | None = None) -> None:
+        if self.dds:  # which tells nothing but the message
+            self.session.put(self.key(topic, of), cdr)
+            return
         self.sequence += 1
         sent_ns = time.time_ns() if t_ns is None else t_ns
         attachment = struct.pack("<qqB16s", self.sequence, sent_ns, 16, b"robot")
-        self.session.put(f"{self.domain}/{topic}/{of}", cdr, attachment=attachment)
+        self.session.put(self.key(topic, of), cdr, attachment=attachment)
 
     def subscribe(self, topic: str, of: str) -> str:
-        key = f"{self.domain}/{topic}/{of}"
+        key = self.key(topic, of)
         messages = self.received.setdefault(key, [])
 
         def receive(sample: zenoh.Sample) -> None:
@@ -131,5 +150,6 @@ class Robot:
 
     def tokens(self) -> set[str]:
         """Return the liveliness keys of all ROS entities of the domain."""
-        replies = self.session.liveliness().get(f"@ros2_lv/{self.domain}/**", timeout=5.0)
+        where = "@/*/@ros2_lv/**" if self.dds else f"@ros2_lv/{self.domain}/**"
+        replies = self.session.liveliness().get(where, timeout=5.0)
         return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}

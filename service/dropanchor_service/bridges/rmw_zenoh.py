@@ -5,7 +5,8 @@ has no type hashes; its keys have a fixed text in their place.
 """
 
 import struct
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
 
 from xxhash import xxh3_128_digest
 
@@ -60,41 +61,51 @@ def attachment_from(data: bytes) -> Attachment | None:
     return Attachment(sequence, t_ns, gid) if length == _GID_BYTES else None
 
 
-def topic_key(domain: int, topic: str, of: RosType) -> str:
-    """Return the key of the messages of a topic."""
-    return f"{domain}/{topic.strip('/')}/{of.dds_name}/{of.type_hash}"
+@dataclass(frozen=True)
+class RmwZenoh:
+    """The keys of a domain. here: the domain as `Announced` has it. advice: what to do when no node is heard."""
 
+    domain: int
+    advice: ClassVar = "Start the nodes with RMW_IMPLEMENTATION=rmw_zenoh_cpp; --ros-connect names their router"
 
-def topic_keys_of_any_version(domain: int, topic: str, of: RosType) -> str:
-    """Return the key expression of a topic's messages of this type, whatever its fields are."""
-    return f"{domain}/{topic.strip('/')}/{of.dds_name}/*"
+    @property
+    def here(self) -> str:
+        return str(self.domain)
 
+    def topic_key(self, topic: str, of: RosType) -> str:
+        """Return the key of the messages of a topic."""
+        return f"{self.domain}/{topic.strip('/')}/{of.dds_name}/{of.type_hash}"
 
-def node_token(domain: int, session: str, node: str) -> str:
-    """Return the liveliness key of a node. session: the Zenoh id. The node has the id 0 and no namespace."""
-    return f"@ros2_lv/{domain}/{session}/0/0/NN/%/%/{node}"
+    def topic_keys_of_any_version(self, topic: str, of: RosType) -> str:
+        """Return the key expression of a topic's messages of this type, whatever its fields are."""
+        return f"{self.domain}/{topic.strip('/')}/{of.dds_name}/*"
 
+    def type_hash_in(self, key: str) -> str:
+        """Return the type hash of a message with this key."""
+        return key.rpartition("/")[2]
 
-def topic_token(domain: int, session: str, node: str, entity: int, role: str, topic: str, of: RosType) -> str:
-    """Return the liveliness key of a publisher (role `MP`) or subscription (`MS`). entity: its id in the session."""
-    name = "%" + topic.strip("/").replace("/", "%")
-    place = f"@ros2_lv/{domain}/{session}/0/{entity}/{role}/%/%/{node}"
-    return f"{place}/{name}/{of.dds_name}/{of.type_hash}/{_QOS}"
+    def node_token(self, session: str, node: str) -> str:
+        """Return the liveliness key of a node. session: the Zenoh id. The node has the id 0 and no namespace."""
+        return f"@ros2_lv/{self.domain}/{session}/0/0/NN/%/%/{node}"
 
+    def topic_token(self, session: str, node: str, entity: int, role: str, topic: str, of: RosType) -> str:
+        """Return the liveliness key of a publisher (role `MP`) or subscription (`MS`). entity: its id."""
+        name = "%" + topic.strip("/").replace("/", "%")
+        place = f"@ros2_lv/{self.domain}/{session}/0/{entity}/{role}/%/%/{node}"
+        return f"{place}/{name}/{of.dds_name}/{of.type_hash}/{_QOS}"
 
-def any_publisher() -> str:
-    """Return the key expression of the liveliness keys of all publishers of all domains."""
-    return f"@ros2_lv/*/*/*/*/{_PUBLISHER}/**"
+    def any_publisher(self) -> str:
+        """Return the key expression of the liveliness keys of all publishers of all domains."""
+        return f"@ros2_lv/*/*/*/*/{_PUBLISHER}/**"
 
-
-def announced_by(token: str) -> Announced | None:
-    """Return the publisher of a liveliness key, None if it is one of something else."""
-    parts = token.split("/")
-    if len(parts) != _TOKEN_PARTS or parts[5] != _PUBLISHER:
-        return None
-    _, domain, session, _, _, _, _, _, node, topic, dds_name, _, _ = parts
-    name = dds_name.replace("::dds_::", "::").removesuffix("_").replace("::", "/")
-    return Announced(domain, session, node, topic.replace("%", "/"), name)
+    def announced_by(self, token: str) -> Announced | None:
+        """Return the publisher of a liveliness key, None if it is one of something else."""
+        parts = token.split("/")
+        if len(parts) != _TOKEN_PARTS or parts[5] != _PUBLISHER:
+            return None
+        _, domain, session, _, _, _, _, _, node, topic, dds_name, _, _ = parts
+        name = dds_name.replace("::dds_::", "::").removesuffix("_").replace("::", "/")
+        return Announced(domain, session, node, topic.replace("%", "/"), name)
 
 
 def gid_of(token: str) -> bytes:

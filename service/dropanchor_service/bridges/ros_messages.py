@@ -5,21 +5,24 @@ Messages of ROS 2 Humble are read too: its Imu has the same fields, its Range ha
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
-from dropanchor_schemas.wire import ImuSample, PressureSample, RangeSample, anchor_number
+from dropanchor_schemas.wire import HeadingSample, ImuSample, PressureSample, RangeSample, anchor_number
 from dropanchor_service.bridges.frames import SITE
 from dropanchor_service.bridges.rmw_zenoh import NO_TYPE_HASH, RosType
+from dropanchor_service.bridges.ros2dds import ANY_TYPE_HASH
 
 Json = Mapping[str, Any]
 
 UNKNOWN_VARIANCE = 1e6  # of roll and pitch, which are not estimated, of a z that was not measured, and of the twist
 USABLE_STATES = ("tracking", "coasting", "degraded")
 TWIST_COVARIANCE = np.diag([UNKNOWN_VARIANCE] * 6).reshape(-1)
+_UNIT = 0.05  # how far the square of a rotation's quaternion may be from 1
 _X, _Y, _Z, _YAW = 0, 1, 2, 5  # rows of the 6 × 6 covariances of ROS
 
 
@@ -71,6 +74,20 @@ class RosMessages:
         if not math.isfinite(message.fluid_pressure):
             raise UnusableError("a pressure that is not finite")
         return PressureSample(_time_ns(message, t_ns), message.fluid_pressure)
+
+    def heading_sample(self, cdr: bytes, t_ns: int, x_rad: float, type_hash: str) -> HeadingSample:
+        """Return the heading of a nav_msgs/Odometry. x_rad: heading of the x axis of its frame. Raises UnusableError.
+
+        t_ns: its time if it has no stamp.
+        """
+        message = self._read(cdr, self.odometry, type_hash)
+        turn = message.pose.pose.orientation
+        if not abs(turn.x**2 + turn.y**2 + turn.z**2 + turn.w**2 - 1) < _UNIT:  # infinite, NaN and 0 included
+            raise UnusableError("an odometry message whose orientation is no rotation")
+        yaw_rad = math.atan2(2 * (turn.w * turn.z + turn.x * turn.y), 1 - 2 * (turn.y**2 + turn.z**2))
+        variance = message.pose.covariance[_YAW * 7]
+        std_rad = math.sqrt(variance) if 0 < variance < math.pi**2 else math.nan
+        return HeadingSample(_time_ns(message, t_ns), math.remainder(yaw_rad + x_rad, math.tau), std_rad)
 
     def pose_cdr(self, pose: Json, height_m: float) -> bytes:
         """Return the geometry_msgs/PoseWithCovarianceStamped of a usable pose (JSON of `Pose`)."""
@@ -131,13 +148,13 @@ class RosMessages:
         return bytes(self._store.serialize_cdr(self._make(of.name, **fields), of.name))
 
     def _read(self, cdr: bytes, of: RosType, type_hash: str) -> Any:
-        if type_hash not in (of.type_hash, NO_TYPE_HASH):
+        stores = {of.type_hash: [self._store], NO_TYPE_HASH: [self._humble], ANY_TYPE_HASH: [self._store, self._humble]}
+        if type_hash not in stores:
             raise UnusableError(f"a {of.name} with other fields than in ROS 2 Humble and Jazzy")
-        store = self._humble if type_hash == NO_TYPE_HASH else self._store
-        try:
-            return store.deserialize_cdr(cdr, of.name)
-        except SerdeError as error:
-            raise UnusableError(f"a damaged {of.name}") from error
+        for store in stores[type_hash]:
+            with suppress(SerdeError):
+                return store.deserialize_cdr(cdr, of.name)
+        raise UnusableError(f"a damaged {of.name}")
 
 
 def is_usable(pose: Json) -> bool:

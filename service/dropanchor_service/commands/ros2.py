@@ -1,6 +1,7 @@
-"""`dropanchor ros2`: a robot with ROS 2 and rmw_zenoh as a tag, without a ROS installation."""
+"""`dropanchor ros2`: a robot with ROS 2 as a tag, without a ROS installation."""
 
 import argparse
+import math
 import os
 import re
 import sys
@@ -14,6 +15,8 @@ from urllib.parse import quote
 from dropanchor_schemas.epochs import EpochFence
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_service.bridges.frames import tag_frame_id
+from dropanchor_service.bridges.rmw_zenoh import RmwZenoh
+from dropanchor_service.bridges.ros2dds import Ros2Dds, RosKeys
 from dropanchor_service.bridges.ros_messages import RosMessages, is_usable
 from dropanchor_service.commands.options import positive
 from dropanchor_service.commands.rest import KEY_VARIABLE, RefusedError, asked
@@ -27,9 +30,10 @@ from dropanchor_tag_client.sources.axes import AXES, Mounting, mounting
 
 DESCRIPTION = f"""\
 Makes a robot with ROS 2 a tag. Its nodes must use rmw_zenoh (RMW_IMPLEMENTATION=rmw_zenoh_cpp, ROS 2 Jazzy or newer;
-of ROS 2 Humble samples are read, and its nodes do not see the poses).
-Reads sensor_msgs/Imu and sensor_msgs/Range, and publishes the tag's pose as geometry_msgs/PoseWithCovarianceStamped,
-nav_msgs/Odometry and TF. If the service requires an API key for poses, set the environment variable {KEY_VARIABLE}.
+of ROS 2 Humble samples are read, and its nodes do not see the poses), or DDS behind zenoh-bridge-ros2dds: --dds.
+Reads sensor_msgs/Imu, sensor_msgs/Range, and the heading of nav_msgs/Odometry, and publishes the tag's pose as
+geometry_msgs/PoseWithCovarianceStamped, nav_msgs/Odometry and TF. If the service requires an API key for poses, set the
+environment variable {KEY_VARIABLE}.
 """
 EPILOG = """\
 published topics (with --namespace dropanchor), while the state is tracking, coasting or degraded:
@@ -42,6 +46,7 @@ While north is unknown, the state is `relative` and no pose is published: it wou
 examples:
   dropanchor ros2 --tag cart --imu /imu/data --range /uwb/range=1
   dropanchor ros2 --tag cart --imu /imu/data --forward=-y --range /uwb/left=1 --range /uwb/right=2
+  dropanchor ros2 --tag cart --dds --imu /imu/data --range /uwb/range=1 --ros-connect tcp/127.0.0.1:7448
   dropanchor ros2 --tag cart --namespace cart/dropanchor --child-frame cart/base_link     poses only
   dropanchor ros2 --credentials cart/ --url https://yard.example:8080 --ros-connect tcp/127.0.0.1:7447
 """
@@ -71,6 +76,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=os.environ.get(DOMAIN_VARIABLE) or "0",
         help=f"ROS domain (default: {DOMAIN_VARIABLE}, or 0)",
     )
+    ros.add_argument(
+        "--dds",
+        nargs="?",
+        const="/",
+        metavar="NAMESPACE",
+        help="the nodes use DDS, and zenoh-bridge-ros2dds listens at --ros-connect; NAMESPACE: as in its configuration",
+    )
     _add_sensors(ros)
     ros.add_argument("--namespace", type=_topic, default="dropanchor", help="of the published topics (%(default)s)")
     ros.add_argument("--child-frame", metavar="FRAME", help="frame that moves with the tag (default: tag/TAG)")
@@ -92,6 +104,12 @@ def _add_sensors(ros: argparse._ArgumentGroup) -> None:
         metavar="TOPIC=ANCHOR",
         help="read sensor_msgs/Range to this anchor from this topic; may be repeated",
     )
+    ros.add_argument(
+        "--odometry",
+        type=_odometry_topic,
+        metavar="TOPIC=DEGREES",
+        help="read the heading of nav_msgs/Odometry; DEGREES: counter-clockwise from east to the x axis of its frame",
+    )
     ros.add_argument("--pressure", type=_topic, metavar="TOPIC", help="read sensor_msgs/FluidPressure from this topic")
 
 
@@ -103,10 +121,11 @@ def run(arguments: argparse.Namespace) -> None:
     mounted = mounting(arguments.forward, arguments.up)
     _say(f"connecting to the router of the ROS nodes at {arguments.ros_connect} (--ros-connect)")
     with ExitStack() as stack:
-        node = RosNode(stack.enter_context(opened_session(_ros_options(arguments))).session, arguments.domain, _NODE)
-        reads = arguments.imu or arguments.range or arguments.pressure
+        keys = Ros2Dds(arguments.dds) if arguments.dds else RmwZenoh(arguments.domain)
+        node = RosNode(stack.enter_context(opened_session(_ros_options(arguments))).session, keys, _NODE)
+        reads = arguments.imu or arguments.range or arguments.odometry or arguments.pressure
         client = stack.enter_context(opened_client(arguments, arguments.tag)) if reads else None
-        _bridge(arguments, node, client, mounted)
+        _bridge(arguments, node, keys, client, mounted)
 
 
 def _ros_options(arguments: argparse.Namespace) -> argparse.Namespace:
@@ -115,11 +134,13 @@ def _ros_options(arguments: argparse.Namespace) -> argparse.Namespace:
     return argparse.Namespace(connect=arguments.ros_connect, connect_timeout=arguments.connect_timeout, **without)
 
 
-def _bridge(arguments: argparse.Namespace, node: RosNode, client: TagClient | None, mounted: Mounting) -> None:
+def _bridge(
+    arguments: argparse.Namespace, node: RosNode, keys: RosKeys, client: TagClient | None, mounted: Mounting
+) -> None:
     messages, stop = RosMessages(), Event()
     poses = Thread(target=PoseOutput(arguments, node, messages).run, args=(stop,), name="poses")
     with interrupts() as interrupt:
-        samples = None if client is None else SampleInput(arguments, node, messages, client, mounted, _say)
+        samples = None if client is None else SampleInput(arguments, node, keys, messages, client, mounted, _say)
         poses.start()
         try:
             _say(f"ready: domain {arguments.domain} at {arguments.ros_connect}, tag {arguments.tag}")
@@ -215,6 +236,14 @@ def _range_topic(text: str) -> tuple[str, str]:
     except InvalidKeyError as error:
         raise argparse.ArgumentTypeError(f"{anchor!r} is no id of an anchor: {error}") from error
     return _topic(topic), anchor
+
+
+def _odometry_topic(text: str) -> tuple[str, float]:
+    topic, _, degrees = text.partition("=")
+    try:
+        return _topic(topic), math.radians(float(degrees))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r}: TOPIC=DEGREES was expected, such as /odom=90") from error
 
 
 def _say(text: str) -> None:

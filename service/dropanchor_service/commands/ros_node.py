@@ -1,4 +1,4 @@
-"""A ROS 2 node on a Zenoh session, as other nodes with rmw_zenoh see it."""
+"""A ROS 2 node on a Zenoh session, as other nodes see it: with rmw_zenoh, or behind a bridge to DDS."""
 
 import time
 from collections.abc import Callable
@@ -7,19 +7,8 @@ from typing import NamedTuple
 
 import zenoh
 
-from dropanchor_service.bridges.rmw_zenoh import (
-    Announced,
-    Attachment,
-    RosType,
-    announced_by,
-    any_publisher,
-    attachment_from,
-    gid_of,
-    node_token,
-    topic_key,
-    topic_keys_of_any_version,
-    topic_token,
-)
+from dropanchor_service.bridges.rmw_zenoh import Announced, Attachment, RosType, attachment_from, gid_of
+from dropanchor_service.bridges.ros2dds import RosKeys
 
 _QUEUED_MESSAGES = 10_000
 _MAX_PUBLISHERS = 10_000
@@ -41,22 +30,23 @@ class RosNode:
     Close the session to end the node.
     """
 
-    def __init__(self, session: zenoh.Session, domain: int, name: str) -> None:
+    def __init__(self, session: zenoh.Session, keys: RosKeys, name: str) -> None:
         self.lost = 0
         self._session = session
-        self._domain = domain
+        self._keys = keys
         self._name = name
         self._entities = 0
         self._queue: Queue[Received] = Queue(_QUEUED_MESSAGES)
-        self._kept: list[object] = [self._declare(node_token(domain, self._id, name))]
+        self._kept: list[object] = [self._declare(keys.node_token(self._id, name))]
         self._announced: dict[str, Announced] = {}
-        self._kept.append(session.liveliness().declare_subscriber(any_publisher(), self._note_publisher, history=True))
+        announced = session.liveliness().declare_subscriber(keys.any_publisher(), self._note_publisher, history=True)
+        self._kept.append(announced)
 
     def publisher(self, topic: str, of: RosType) -> Callable[[bytes], None]:
         """Announce a publisher, and return the function that publishes a CDR message."""
         gid = gid_of(self._announce("MP", topic, of))
         publisher = self._session.declare_publisher(
-            topic_key(self._domain, topic, of), congestion_control=zenoh.CongestionControl.DROP
+            self._keys.topic_key(topic, of), congestion_control=zenoh.CongestionControl.DROP
         )
         sequence = 0
 
@@ -74,13 +64,13 @@ class RosNode:
         def receive(sample: zenoh.Sample) -> None:  # on a thread of Zenoh: it must not block
             attached = None if sample.attachment is None else attachment_from(sample.attachment.to_bytes())
             t_ns = time.time_ns() if attached is None else attached.t_ns
-            type_hash = str(sample.key_expr).rpartition("/")[2]
+            type_hash = self._keys.type_hash_in(str(sample.key_expr))
             try:
                 self._queue.put_nowait(Received(topic, sample.payload.to_bytes(), t_ns, type_hash, handle))
             except Full:
                 self.lost += 1
 
-        self._kept.append(self._session.declare_subscriber(topic_keys_of_any_version(self._domain, topic, of), receive))
+        self._kept.append(self._session.declare_subscriber(self._keys.topic_keys_of_any_version(topic, of), receive))
 
     def take(self, timeout_s: float) -> Received | None:
         """Return the next message, None if none comes in time."""
@@ -90,12 +80,12 @@ class RosNode:
             return None
 
     def publishers_of_others(self) -> list[Announced]:
-        """Return the publishers that other nodes announce, of all domains."""
+        """Return the publishers that other nodes announce."""
         return [one for one in list(self._announced.values()) if one.session != self._id]
 
     def _note_publisher(self, sample: zenoh.Sample) -> None:  # on a thread of Zenoh
         token = str(sample.key_expr)
-        announced = announced_by(token)
+        announced = self._keys.announced_by(token)
         if sample.kind == zenoh.SampleKind.DELETE:
             self._announced.pop(token, None)
         elif announced is not None and len(self._announced) < _MAX_PUBLISHERS:
@@ -107,7 +97,7 @@ class RosNode:
 
     def _announce(self, role: str, topic: str, of: RosType) -> str:
         self._entities += 1
-        token = topic_token(self._domain, self._id, self._name, self._entities, role, topic, of)
+        token = self._keys.topic_token(self._id, self._name, self._entities, role, topic, of)
         self._kept.append(self._declare(token))
         return token
 

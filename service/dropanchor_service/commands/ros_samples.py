@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import partial
 
 from dropanchor_service.bridges.rmw_zenoh import NO_TYPE_HASH
+from dropanchor_service.bridges.ros2dds import RosKeys
 from dropanchor_service.bridges.ros_messages import RosMessages, UnusableError
 from dropanchor_service.commands.ros_node import Received, RosNode
 from dropanchor_service.commands.ros_silence import SilenceWatch
@@ -28,6 +29,7 @@ class SampleInput:
         self,
         arguments: argparse.Namespace,
         node: RosNode,
+        keys: RosKeys,
         messages: RosMessages,
         client: TagClient,
         mounted: Mounting,
@@ -43,9 +45,7 @@ class SampleInput:
         self._tell_s = 0.0
         self._is_humble = False
         wanted = self._subscribed(arguments)
-        self._silence = SilenceWatch(
-            wanted, arguments.domain, arguments.ros_connect, node.publishers_of_others, time.monotonic()
-        )
+        self._silence = SilenceWatch(wanted, keys, arguments.ros_connect, node.publishers_of_others, time.monotonic())
 
     def _subscribed(self, arguments: argparse.Namespace) -> dict[str, str]:
         """Subscribe to the topics that were asked for. Return the type of each."""
@@ -56,6 +56,10 @@ class SampleInput:
         for topic, anchor in arguments.range:
             node.subscribe(topic, messages.range, partial(self._range, anchor))
             wanted[topic] = messages.range.name
+        if arguments.odometry:
+            topic, x_rad = arguments.odometry
+            node.subscribe(topic, messages.odometry, partial(self._odometry, x_rad))
+            wanted[topic] = messages.odometry.name
         if arguments.pressure:
             node.subscribe(arguments.pressure, messages.pressure, self._pressure)
             wanted[arguments.pressure] = messages.pressure.name
@@ -102,6 +106,10 @@ class SampleInput:
     def _range(self, anchor: str, received: Received) -> None:
         sample = self._messages.range_sample(received.cdr, received.t_ns, anchor, received.type_hash)
         self._client.publish_range(anchor, sample.range_m, t_ns=sample.t_ns, std_m=sample.std_m)
+
+    def _odometry(self, x_rad: float, received: Received) -> None:
+        sample = self._messages.heading_sample(received.cdr, received.t_ns, x_rad, received.type_hash)
+        self._client.publish_heading(sample.heading_rad, t_ns=sample.t_ns, std_rad=sample.std_rad)
 
     def _pressure(self, received: Received) -> None:
         sample = self._messages.pressure_sample(received.cdr, received.t_ns, received.type_hash)

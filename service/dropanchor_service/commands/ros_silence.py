@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 
 from dropanchor_service.bridges.rmw_zenoh import Announced
+from dropanchor_service.bridges.ros2dds import RosKeys
 
 SILENT_S = 5.0
 _MAX_TOPICS = 20
@@ -18,13 +19,13 @@ class SilenceWatch:
     def __init__(
         self,
         wanted: Mapping[str, str],
-        domain: int,
+        keys: RosKeys,
         router: str,
         published: Callable[[], list[Announced]],
         now_s: float,
     ) -> None:
         self._wanted = wanted
-        self._domain = str(domain)
+        self._keys = keys
         self._router = router
         self._published = published
         self._heard_s = dict.fromkeys(wanted, now_s)
@@ -52,7 +53,7 @@ class SilenceWatch:
 
     def _sentence(self, topic: str, type_name: str) -> str:
         everywhere = self._published()
-        here = [one for one in everywhere if one.domain == self._domain]
+        here = [one for one in everywhere if one.domain == self._keys.here]
         silent = f"no message of {topic} comes"
         if not here:
             return f"{silent}: {self._nobody({one.domain for one in everywhere})}"
@@ -68,11 +69,10 @@ class SilenceWatch:
     def _nobody(self, domains: Iterable[str]) -> str:
         others = ", ".join(sorted(domains))
         if others:
-            return f"no node publishes anything in domain {self._domain}, but in domain {others}: --domain says which"
-        return (
-            f"no node that publishes is connected to the router {self._router}. Start the nodes with "
-            "RMW_IMPLEMENTATION=rmw_zenoh_cpp; --ros-connect names their router"
-        )
+            return (
+                f"no node publishes anything in domain {self._keys.here}, but in domain {others}: --domain says which"
+            )
+        return f"no node that publishes is connected to the router {self._router}. {self._keys.advice}"
 
 
 def _listed(published: Iterable[Announced], type_name: str) -> str:

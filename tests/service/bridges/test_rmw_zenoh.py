@@ -1,38 +1,35 @@
-"""Keys, liveliness tokens and attachments as rmw_zenoh documents them."""
+"""Keys, liveliness tokens and attachments as rmw_zenoh documents them, and zenoh-bridge-ros2dds has them."""
 
-from dropanchor_service.bridges.rmw_zenoh import (
-    Announced,
-    Attachment,
-    RosType,
-    announced_by,
-    attachment_from,
-    gid_of,
-    node_token,
-    topic_key,
-    topic_token,
-)
+import pytest
+
+from dropanchor_service.bridges.rmw_zenoh import Announced, Attachment, RmwZenoh, RosType, attachment_from, gid_of
+from dropanchor_service.bridges.ros2dds import Ros2Dds, RosKeys
 
 HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 STRING = RosType("std_msgs/msg/String", HASH)
 
 
 def test_keys_and_tokens_have_the_form_of_the_examples_in_the_design_document() -> None:
-    assert topic_key(0, "/chatter", STRING) == f"0/chatter/std_msgs::msg::dds_::String_/{HASH}"
-    assert topic_key(2, "/robot1/chatter", STRING) == f"2/robot1/chatter/std_msgs::msg::dds_::String_/{HASH}"
-    assert node_token(0, "aac3178e146ba6f1fc6e6a4085e77f21", "listener") == (
+    assert RmwZenoh(0).topic_key("/chatter", STRING) == f"0/chatter/std_msgs::msg::dds_::String_/{HASH}"
+    assert RmwZenoh(2).topic_key("/robot1/chatter", STRING) == f"2/robot1/chatter/std_msgs::msg::dds_::String_/{HASH}"
+    assert RmwZenoh(0).node_token("aac3178e146ba6f1fc6e6a4085e77f21", "listener") == (
         "@ros2_lv/0/aac3178e146ba6f1fc6e6a4085e77f21/0/0/NN/%/%/listener"
     )
-    assert topic_token(0, "8b20917502ee955ac4476e0266340d5c", "talker", 10, "MP", "chatter", STRING) == (
+    assert RmwZenoh(0).topic_token("8b20917502ee955ac4476e0266340d5c", "talker", 10, "MP", "chatter", STRING) == (
         "@ros2_lv/0/8b20917502ee955ac4476e0266340d5c/0/10/MP/%/%/talker/%chatter/"
         f"std_msgs::msg::dds_::String_/{HASH}/::,10:,:,:,,"
     )
 
 
-def test_the_publisher_of_a_token_is_read_back() -> None:
-    token = topic_token(7, "8b20", "driver", 10, "MP", "/imu/data", STRING)
-    assert announced_by(token) == Announced("7", "8b20", "driver", "/imu/data", "std_msgs/msg/String")
-    for other in (topic_token(7, "8b20", "driver", 10, "MS", "/imu", STRING), node_token(7, "8b20", "driver"), ""):
-        assert announced_by(other) is None
+@pytest.mark.parametrize(
+    ("keys", "domain", "node"),
+    [(RmwZenoh(7), "7", "driver"), (Ros2Dds("/"), "", "behind the bridge"), (Ros2Dds("/a"), "", "behind the bridge")],
+)
+def test_the_publisher_of_a_token_is_read_back(keys: RosKeys, domain: str, node: str) -> None:
+    token = keys.topic_token("8b20", "driver", 10, "MP", "/imu/data", STRING)
+    assert keys.announced_by(token) == Announced(domain, "8b20", node, "/imu/data", "std_msgs/msg/String")
+    for other in (keys.topic_token("8b20", "driver", 10, "MS", "/imu", STRING), keys.node_token("8b20", "driver"), ""):
+        assert keys.announced_by(other) is None
 
 
 def test_an_attachment_has_33_bytes() -> None:
