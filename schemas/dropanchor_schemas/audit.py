@@ -13,6 +13,7 @@ AuditKind = Literal[
     "remote-settings",
     "zone",
     "rule",
+    "alarm",
     "plan",
     "plan-image",
     "destination",

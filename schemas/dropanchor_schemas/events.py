@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from dropanchor_schemas.models import Frozen
+from dropanchor_schemas.zones import Severity
 
 
 class EventType(StrEnum):
@@ -20,6 +21,8 @@ class EventType(StrEnum):
     TAG_LOST = "dropanchor.tag.lost"
     TAG_AMBIGUOUS = "dropanchor.tag.ambiguous"
     EVENT_RETRACTED = "dropanchor.event.retracted"
+    ALARM_OVER = "dropanchor.alarm.over"
+    ALARM_ACKNOWLEDGED = "dropanchor.alarm.acknowledged"
     DESTINATION_TEST = "dropanchor.destination.test"
 
 
@@ -59,6 +62,17 @@ class EventData(Frozen):
         description="Why it is retracted: `start_denied`: the ranges contradict the start of the tag; "
         "`start_taken_back`: an operator took it back.",
     )
+    severity: Severity | None = Field(
+        default=None, description="Of the alarm that this event begins, ends or acknowledges; null: it concerns none."
+    )
+    alarm: str | None = Field(
+        default=None,
+        description="`id` of the event that began the alarm which is over or acknowledged. `zone`, `rule`, `name` and "
+        "`other_tag` are those of that event, and so is `since_ns`.",
+    )
+    alarm_type: EventType | None = Field(default=None, description="`type` of that event.")
+    acknowledged_by: str | None = Field(default=None, description="Who acknowledged it; empty: somebody without a key.")
+    note: str | None = Field(default=None, description="What was noted then.")
 
 
 class Event(Frozen):

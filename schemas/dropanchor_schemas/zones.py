@@ -1,5 +1,6 @@
 """Models of zones, and of the rules that make events."""
 
+from enum import StrEnum
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field, FiniteFloat, model_validator
@@ -36,6 +37,17 @@ class Circle(Exact):
     radius_m: Annotated[FiniteFloat, Field(ge=0.1, le=10_000), NumberOnly]
 
 
+class Severity(StrEnum):
+    """What a rule makes when it finds something: an event alone, or also an alarm, which lasts until it is over."""
+
+    EVENT = "event"
+    WARNING = "warning"
+    ALARM = "alarm"
+
+
+_ALARM = "`warning` and `alarm` also begin an alarm."
+
+
 class Concerned(Exact):
     """The tags that a zone or a rule concerns. If both lists are empty, it concerns all tags."""
 
@@ -43,6 +55,14 @@ class Concerned(Exact):
     groups: Annotated[list[Annotated[Label, Field(min_length=1)]], Field(max_length=1000)] = Field(
         default=[], description="Groups, as the settings of their tags name them."
     )
+    muted_until_ns: Annotated[int, Field(ge=0, lt=2**62)] | None = Field(
+        default=None,
+        description="UTC, ns: until then its alarms disturb nobody: the page shows them as muted, and no "
+        "e-mail tells of its events. null: they do.",
+    )
+
+    def is_muted_at(self, t_ns: int) -> bool:
+        return self.muted_until_ns is not None and t_ns < self.muted_until_ns
 
 
 class Zone(Concerned):
@@ -60,6 +80,9 @@ class Zone(Concerned):
     speed_mps: Annotated[FiniteFloat, Field(ge=0.1, le=100), NumberOnly] | None = Field(
         default=None, description="A tag inside that moves faster than this makes an event; null: never."
     )
+    enter_severity: Severity = Field(default=Severity.EVENT, description=f"What entering makes. {_ALARM}")
+    dwell_severity: Severity = Field(default=Severity.EVENT, description=f"What staying too long makes. {_ALARM}")
+    speed_severity: Severity = Field(default=Severity.EVENT, description=f"What being too fast makes. {_ALARM}")
     delay_s: Annotated[FiniteFloat, Field(ge=0, le=600), NumberOnly] = Field(
         default=1.0,
         description="How long a tag must be inside or outside, or too fast, before the event.",
@@ -109,6 +132,7 @@ class ZoneOccupancyList(BaseModel):
 class _Rule(Concerned):
     id: Id = Field(description="Id of the rule, as in its path.")
     name: str = Field(default="", max_length=100, description="Name for people.")
+    severity: Severity = Field(default=Severity.EVENT, description=f"What it makes. {_ALARM}")
 
 
 class TooCloseRule(_Rule):

@@ -72,34 +72,43 @@ def of_kind(service: Running, kind: str) -> int:
     return sum(event["type"] == f"dropanchor.zone.{kind}" for event in stored(service))
 
 
-def test_events_survive_two_kills_and_a_receiver_that_is_down(tmp_path: Path) -> None:
+def test_events_and_alarms_survive_two_kills_and_a_receiver_that_is_down(tmp_path: Path) -> None:
     receiver, data = Receiver(port=free_port()), tmp_path / "data"
     options = ("--config", str(settings(tmp_path)), "--data-dir", str(data))
     with running_service(*options) as service:
-        service.put("/api/v1/zones/west", WEST)
+        service.put("/api/v1/zones/west", WEST | {"enter_severity": "alarm"})
         service.put("/api/v1/destinations/mes", {"type": "webhook", "id": "mes", "url": receiver.url, "secret": SECRET})
         start_at(service, NEAR_M)
         stand(service, NEAR_M, lambda: of_kind(service, "enter") == len(TAGS))
-        before = stored(service)
+        seen = service.get("/api/v1/alarms")["alarms"][0]["id"]
+        service.put(f"/api/v1/alarms/{seen}/acknowledgement", {"note": "is watched"})
+        before, alarms = stored(service), service.get("/api/v1/alarms")
+        assert (len(before), len(alarms["alarms"])) == (len(TAGS) + 1, len(TAGS))
         service.stop(signal.SIGKILL)
     with running_service(*options) as service:
         assert stored(service) == before
         stand(service, NEAR_M, after(3.0))
         assert stored(service) == before  # the tags are inside, as before the kill
+        assert service.get("/api/v1/alarms") == alarms
         start_at(service, FAR_M)
         stand(service, FAR_M, lambda: of_kind(service, "exit") == len(TAGS))
         time.sleep(DOWN_S)
         service.stop(signal.SIGKILL)
     with running_service(*options) as service, running_receiver(receiver):
-        wait_until(lambda: len({event["id"] for event in receiver.accepted}) == 2 * len(TAGS))
+        wait_until(lambda: len({event["id"] for event in receiver.accepted}) == 3 * len(TAGS) + 1)
         wait_until(lambda: service.get("/api/v1/destinations/mes")["pending"] == 0)
         everything = stored(service)
+        ended = service.get("/api/v1/alarms")["alarms"]
     first = {event["id"]: event for event in reversed(receiver.accepted)}
     assert first == {event["id"]: event for event in everything}
     by_tag: dict[str, list[str]] = defaultdict(list)
     for event in {event["id"]: event for event in receiver.accepted}.values():
         by_tag[event["subject"]].append(event["type"].rpartition(".")[2])
-    assert by_tag == {tag: ["enter", "exit"] for tag in TAGS}
+    expected = {tag: ["enter", "over", "exit"] for tag in TAGS}
+    expected[everything[len(TAGS)]["subject"]].insert(1, "acknowledged")
+    assert by_tag == expected
+    assert len(ended) == len(TAGS) - 1  # nobody has acknowledged these
+    assert all(alarm["over_ns"] is not None for alarm in ended)
 
 
 def after(seconds: float) -> Any:

@@ -10,6 +10,7 @@ import numpy as np
 from dropanchor_schemas.events import Event
 from dropanchor_schemas.zones import Circle, EventRule, Zone
 from dropanchor_service.estimation.columns import HYPOTHESIS, State, StateReason
+from dropanchor_service.events.alarms import OPEN, StoredAlarm, alarms, open_alarms
 from dropanchor_service.events.database import Database
 from dropanchor_service.events.drafts import Draft
 from dropanchor_service.events.site_watch import WatchedSite
@@ -22,6 +23,26 @@ from support.api import ApiBench, make_api_bench
 
 S = 1_000_000_000
 KEEP = Retention(keep_ns=10**18, max_bytes=2**40)
+
+
+_BACK = (
+    "ALTER TABLE deliveries RENAME destination TO webhook",
+    "DROP TABLE stays",
+    "DROP INDEX dead_letters; ALTER TABLE deliveries DROP COLUMN again_ns",
+    "DROP TABLE starts",
+    "DROP TABLE changes",
+    "DROP TABLE alarms",
+)
+"""From the version after each to that before."""
+
+
+def make_older(database: Database, version: int) -> None:
+    """Make the file one of an earlier version, and close it."""
+    with database.transaction() as connection:
+        for step in "; ".join(reversed(_BACK[version - 1 :])).split("; "):
+            connection.execute(step)
+        connection.execute(f"PRAGMA user_version = {version}")
+    database.close()
 
 
 def circle(name: str = "dock", x: float = 0.0, y: float = 0.0, radius_m: float = 5.0, **fields: Any) -> Zone:
@@ -46,9 +67,8 @@ class EventBench:
         """Start the service's part again, from what is stored."""
         self.store = EventStore(self.database, "yard", self._addressees)
         answers = self.poses.answers
-        site = WatchedSite(
-            answers.site, answers.tags, self.health, self.items, self.store.states(), self.store.starts()
-        )
+        stored = self.store.states(), self.store.starts(), open_alarms(self.database)
+        site = WatchedSite(answers.site, answers.tags, self.health, self.items, *stored)
         self.watcher = Watcher([site], answers.latest, lambda: self.poses.now_ns)
         self.thread = EventThread(self.watcher, [self.store], KEEP, lambda: self.poses.now_ns, 0.1)
 
@@ -88,6 +108,9 @@ class EventBench:
             self.poses.answers.latest.write(self.poses.answers.latest.row(row)[None], hypotheses)  # type: ignore[index]
             self.thread.turn()
         return [f"{event.type.value.removeprefix('dropanchor.')} {event.subject}" for event in self.events(before)]
+
+    def alarms(self, condition: str = OPEN) -> list[StoredAlarm]:
+        return alarms(self.database, condition, 2**62, (), 100)
 
     def _addressees(self, _: Draft) -> Sequence[str]:
         return self.addressees

@@ -2,6 +2,7 @@
 
 from dropanchor_service.api.routes import (
     access,
+    alarms,
     api_keys,
     audit,
     basemap,
@@ -67,6 +68,7 @@ SITE = (
     zones.router,
     zone_occupancy.router,
     events.router,
+    alarms.router,
     destinations.router,
     receiver_networks.router,
     shares.router,

@@ -6,7 +6,7 @@ from typing import Any
 
 import orjson
 
-from dropanchor_schemas.destinations import Destination, EventDestination, MqttPosesDestination
+from dropanchor_schemas.destinations import Destination, EmailDestination, EventDestination, MqttPosesDestination
 from dropanchor_schemas.sentences import say
 from dropanchor_service.events.drafts import Draft
 from dropanchor_service.runtime.atomic_file import write_atomically
@@ -46,9 +46,11 @@ def _take_over(webhooks: Path, path: Path, recovery: Recovery) -> None:
 
 
 def _wants(destination: EventDestination, draft: Draft) -> bool:
-    types = {draft.type, draft.data.get("retracted_type")}  # who got an event learns that it is not true
+    data = draft.data  # who got an event learns that it is not true, or what became of its alarm
+    types = {draft.type, data.get("retracted_type"), data.get("alarm_type")}
     return (
         destination.enabled
+        and not (draft.is_muted and isinstance(destination, EmailDestination))
         and (not destination.types or not types.isdisjoint(destination.types))
         and (not destination.zones or draft.zone in destination.zones)
         and (not destination.tags or draft.tag in destination.tags or draft.data.get("other_tag") in destination.tags)

@@ -22,6 +22,7 @@ def sentence(event: Event, name_of: NameOf, words: Words) -> str:
     values = {"tag": name_of(event.subject), "other": other, "place": _place(data)}
     values |= {"number": _number(event, words), "lasted": _lasted(data, words), "before": _before(data, words)}
     values["why"] = "" if data.reason is None else words.reasons[data.reason]
+    values |= {"who": f"({data.acknowledged_by})" if data.acknowledged_by else "", "note": data.note or ""}
     return " ".join(words.sentences[event.type].format(**values).split())
 
 
@@ -59,8 +60,9 @@ def _place(data: EventData) -> str:
 
 
 def _before(data: EventData, words: Words) -> str:
-    """Return the kind of the event that is retracted."""
-    return "" if data.retracted_type is None else words.kinds[data.retracted_type].format(place=_place(data))
+    """Return the kind of the event that this one is about."""
+    before = data.retracted_type or data.alarm_type
+    return "" if before is None else words.kinds[before].format(place=_place(data))
 
 
 def _metres(value: float | None, words: Words) -> str:

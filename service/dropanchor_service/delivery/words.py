@@ -12,8 +12,9 @@ from dropanchor_schemas.events import EventType, RetractionReason
 class Words:
     """How a mail says things in one language. sentences: of one event; kinds: what events of several tags share.
 
-    In them stand `{tag}`, `{other}`, `{place}`, `{number}` and `{lasted}` for the values of the event, and of a
-    retraction `{before}` for the kind of the retracted event and `{why}` for the reason.
+    In them stand `{tag}`, `{other}`, `{place}`, `{number}` and `{lasted}` for the values of the event; of one about
+    another event, such as a retraction, `{before}` for the kind of that; `{why}` for the reason, and `{who}` and
+    `{note}` for an acknowledgement.
     """
 
     sentences: Mapping[EventType, str]
@@ -47,6 +48,8 @@ _ENGLISH = Words(
         EventType.TAG_LOST: "{tag} has been lost for {lasted}",
         EventType.TAG_AMBIGUOUS: "{tag} has been ambiguous for {lasted}",
         EventType.EVENT_RETRACTED: "Retracted for {tag}: {before} ({why})",
+        EventType.ALARM_OVER: "Over for {tag}: {before} (after {lasted})",
+        EventType.ALARM_ACKNOWLEDGED: "Acknowledged for {tag}: {before} {who} {note}",
         EventType.DESTINATION_TEST: "This is a test of the destination {tag}",
     },
     kinds={
@@ -59,6 +62,8 @@ _ENGLISH = Words(
         EventType.TAG_LOST: "lost: {place}",
         EventType.TAG_AMBIGUOUS: "ambiguous: {place}",
         EventType.EVENT_RETRACTED: "retracted: {before}",
+        EventType.ALARM_OVER: "over: {before}",
+        EventType.ALARM_ACKNOWLEDGED: "acknowledged: {before}",
         EventType.DESTINATION_TEST: "test of {place}",
     },
     reasons={
@@ -85,6 +90,8 @@ _GERMAN = Words(
         EventType.TAG_LOST: "{tag} ist seit {lasted} verloren",
         EventType.TAG_AMBIGUOUS: "{tag} ist seit {lasted} mehrdeutig",
         EventType.EVENT_RETRACTED: "Zurückgezogen für {tag}: {before} ({why})",
+        EventType.ALARM_OVER: "Vorbei für {tag}: {before} (nach {lasted})",
+        EventType.ALARM_ACKNOWLEDGED: "Quittiert für {tag}: {before} {who} {note}",
         EventType.DESTINATION_TEST: "Dies ist ein Test des Ziels {tag}",
     },
     kinds={
@@ -97,6 +104,8 @@ _GERMAN = Words(
         EventType.TAG_LOST: "verloren: {place}",
         EventType.TAG_AMBIGUOUS: "mehrdeutig: {place}",
         EventType.EVENT_RETRACTED: "zurückgezogen: {before}",
+        EventType.ALARM_OVER: "vorbei: {before}",
+        EventType.ALARM_ACKNOWLEDGED: "quittiert: {before}",
         EventType.DESTINATION_TEST: "Test: {place}",
     },
     reasons={

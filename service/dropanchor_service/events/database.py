@@ -18,7 +18,7 @@ from dropanchor_service.runtime.recovery import Recovery, damaged
 from dropanchor_service.runtime.written_by import later_schema
 
 FILE_NAME = "events.sqlite"
-VERSION = 6
+VERSION = 7
 BUSY_S = 5.0
 CHECK_S = 1.0  # at a start: a large file is checked in part
 INSTEAD = say("new_events", "new events start, and what waited for its destinations is lost")
@@ -42,6 +42,15 @@ CREATE TABLE changes (
     kind TEXT NOT NULL, item TEXT NOT NULL, before TEXT, after TEXT, confirmed INTEGER NOT NULL DEFAULT 0
 );
 CREATE INDEX changes_by_time ON changes (t_ns);
+"""
+_ALARMS = """
+CREATE TABLE alarms (
+    sequence INTEGER PRIMARY KEY, id TEXT NOT NULL UNIQUE, source TEXT NOT NULL, item TEXT NOT NULL, tag TEXT NOT NULL,
+    other TEXT NOT NULL, flag INTEGER NOT NULL, severity TEXT NOT NULL, over_ns INTEGER, acknowledged TEXT,
+    body BLOB NOT NULL
+);
+CREATE INDEX open_alarms ON alarms (source, item, tag, other) WHERE over_ns IS NULL;
+CREATE INDEX current_alarms ON alarms (sequence) WHERE over_ns IS NULL OR acknowledged IS NULL;
 """
 _STAYS_OF_EVENTS = """
 INSERT INTO stays SELECT tag, zone, entered_ns, since_ns FROM (
@@ -71,8 +80,20 @@ CREATE TABLE deliveries (
 {_STAYS}
 {_STARTS}
 {_CHANGES}
+{_ALARMS}
 PRAGMA user_version = {VERSION};
 """
+
+
+_STEPS = (
+    "ALTER TABLE deliveries RENAME webhook TO destination;",
+    f"{_STAYS} {_STAYS_OF_EVENTS}",
+    f"ALTER TABLE deliveries ADD again_ns INTEGER; {_DEAD_LETTERS}",
+    _STARTS,
+    _CHANGES,
+    _ALARMS,
+)
+"""From each version to the next one."""
 
 
 class EventFileError(sqlite3.Error):
@@ -182,25 +203,9 @@ class Database:
     def _prepare(self, connection: sqlite3.Connection) -> None:
         version = connection.execute("PRAGMA user_version").fetchone()[0]
         tables = connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
-        if version == 1:
-            connection.executescript(
-                "BEGIN; ALTER TABLE deliveries RENAME webhook TO destination; PRAGMA user_version = 2; COMMIT;"
-            )
-            version = 2
-        if version == 2:
-            connection.executescript(f"BEGIN; {_STAYS} {_STAYS_OF_EVENTS} PRAGMA user_version = 3; COMMIT;")
-            version = 3
-        if version == 3:
-            connection.executescript(
-                f"BEGIN; ALTER TABLE deliveries ADD again_ns INTEGER; {_DEAD_LETTERS} PRAGMA user_version = 4; COMMIT;"
-            )
-            version = 4
-        if version == 4:
-            connection.executescript(f"BEGIN; {_STARTS} PRAGMA user_version = 5; COMMIT;")
-            version = 5
-        if version == 5:
-            connection.executescript(f"BEGIN; {_CHANGES} PRAGMA user_version = 6; COMMIT;")
-            version = VERSION
+        for step in _STEPS[version - 1 :] if 0 < version < VERSION else ():
+            version += 1
+            connection.executescript(f"BEGIN; {step} PRAGMA user_version = {version}; COMMIT;")
         if self._path is not None and version > VERSION:
             raise EventFileError(later_schema(self._path, version, VERSION, self._path))
         if version == 0 and tables:

@@ -1,12 +1,11 @@
 """Describe changes as events."""
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
 from dropanchor_schemas.events import EventType
-from dropanchor_schemas.zones import EventRule, TooCloseRule
-from dropanchor_service.events.drafts import Draft, rounded
-from dropanchor_service.zones.judge import DWELL, ENTER, EXIT, SPEED
+from dropanchor_schemas.zones import EventRule, Severity, TooCloseRule, Zone
+from dropanchor_service.events.drafts import AlarmBegan, Draft, StateKey, rounded
+from dropanchor_service.zones.judge import DWELL, DWELT, ENTER, EXIT, INSIDE, SPEED, TOO_FAST
 from dropanchor_service.zones.pair_watch import PairChange
 from dropanchor_service.zones.tag_watch import FleetState, TagChange
 from dropanchor_service.zones.zone_watch import ZoneChange
@@ -22,13 +21,22 @@ _OF_RULES = {
     "lost": EventType.TAG_LOST,
     "ambiguous": EventType.TAG_AMBIGUOUS,
 }
-NameOf = Callable[[int], str]
+_FLAG_OF = {ENTER: INSIDE, DWELL: DWELT, SPEED: TOO_FAST}
+_ACTIVE = 1
 
 
-def zone_event(change: ZoneChange, name_of: NameOf) -> Draft | None:
-    """Return the event of a tag in a zone, None where the zone does not want it. name_of: tag by row."""
-    zone, pose = change.zone, change.pose
-    if (change.kind == ENTER and not zone.enter) or (change.kind == EXIT and not zone.exit):
+def severities(item: Zone | EventRule) -> dict[int, Severity]:
+    """Return what a zone or rule makes, by the flag of the state that it sets then."""
+    if isinstance(item, Zone):
+        return {INSIDE: item.enter_severity, DWELT: item.dwell_severity, TOO_FAST: item.speed_severity}
+    return {_ACTIVE: item.severity}
+
+
+def zone_event(change: ZoneChange, key: StateKey) -> Draft | None:
+    """Return the event of a tag in a zone, None where the zone does not want it."""
+    zone, pose, flag = change.zone, change.pose, _FLAG_OF.get(change.kind)
+    is_silent = change.kind == ENTER and not zone.enter and zone.enter_severity is Severity.EVENT
+    if change.kind not in _OF_ZONES or is_silent or (change.kind == EXIT and not zone.exit):
         return None
     data: dict[str, Any] = {
         "t_ns": change.t_ns,
@@ -40,26 +48,36 @@ def zone_event(change: ZoneChange, name_of: NameOf) -> Draft | None:
         "probability": rounded(change.p),
         "speed_mps": rounded(pose["speed"]),
     }
-    return Draft(_OF_ZONES[change.kind], name_of(change.row), data)
+    return _draft(_OF_ZONES[change.kind], zone, key, data, flag)
 
 
-def pair_event(rule: TooCloseRule, change: PairChange, now_ns: int, name_of: NameOf) -> Draft:
+def pair_event(rule: TooCloseRule, change: PairChange, key: StateKey, now_ns: int) -> Draft:
     """Return the event of two tags that are too close."""
-    tag, other = map(name_of, change.rows)
     data = _rule_data(rule, now_ns, change.since_ns) | {
         "probability": rounded(change.p),
-        "other_tag": other,
+        "other_tag": key.other,
         "distance_m": rounded(change.distance_m),
     }
-    return Draft(EventType.TAGS_TOO_CLOSE, tag, data)
+    return _draft(EventType.TAGS_TOO_CLOSE, rule, key, data)
 
 
-def tag_event(rule: EventRule, change: TagChange, fleet: FleetState, now_ns: int, names: Sequence[str]) -> Draft:
-    """Return the event of a single tag. names: of the tags of its site."""
+def tag_event(rule: EventRule, change: TagChange, key: StateKey, fleet: FleetState, now_ns: int) -> Draft:
+    """Return the event of a single tag."""
     data = _rule_data(rule, now_ns, change.since_ns)
     if rule.type == "battery_low":
         data["battery_fraction"] = rounded(fleet.battery[change.place])
-    return Draft(_OF_RULES[rule.type], names[change.place], data)
+    return _draft(_OF_RULES[rule.type], rule, key, data)
+
+
+def _draft(
+    kind: EventType, item: Zone | EventRule, key: StateKey, data: dict[str, Any], flag: int | None = _ACTIVE
+) -> Draft:
+    """Return the event, which begins an alarm if the zone or rule says so. flag: that the state gets."""
+    severity = Severity.EVENT if flag is None else severities(item)[flag]
+    is_muted = item.is_muted_at(data["t_ns"])
+    if flag is None or severity is Severity.EVENT:
+        return Draft(kind, key.tag, data, is_muted=is_muted)
+    return Draft(kind, key.tag, data | {"severity": severity.value}, AlarmBegan(key, flag), is_muted)
 
 
 def _rule_data(rule: EventRule, now_ns: int, since_ns: int) -> dict[str, Any]:

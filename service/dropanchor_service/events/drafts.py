@@ -9,13 +9,34 @@ from typing import Any, NamedTuple
 from dropanchor_schemas.events import EventType, RetractionReason
 
 
+class StateKey(NamedTuple):
+    """Whose state it is. source: `zone` or `rule`. other: the second tag of a pair, else empty."""
+
+    source: str
+    item: str
+    tag: str
+    other: str = ""
+
+
+class AlarmBegan(NamedTuple):
+    """An alarm lasts as long as a state has a flag."""
+
+    key: StateKey
+    flag: int
+
+
 @dataclass(frozen=True)
 class Draft:
-    """An event before it is stored. data: of `EventData`, without what is null."""
+    """An event before it is stored. data: of `EventData`, without what is null.
+
+    alarm: that it begins. is_muted: whether it disturbs nobody.
+    """
 
     type: EventType
     tag: str
     data: Mapping[str, Any]
+    alarm: AlarmBegan | None = None
+    is_muted: bool = False
 
     @property
     def t_ns(self) -> int:
@@ -30,15 +51,6 @@ def destination_test(destination: str) -> Draft:
     """Return an event that only shows that a destination works."""
     now_ns = time.time_ns()
     return Draft(EventType.DESTINATION_TEST, destination, {"t_ns": now_ns, "since_ns": now_ns, "name": destination})
-
-
-class StateKey(NamedTuple):
-    """Whose state it is. source: `zone` or `rule`. other: the second tag of a pair, else empty."""
-
-    source: str
-    item: str
-    tag: str
-    other: str = ""
 
 
 class StateValue(NamedTuple):
@@ -83,7 +95,16 @@ class StartClosed(NamedTuple):
     retracts: RetractionReason | None = None
 
 
-Happening = Draft | StartBegan | StartClosed
+class AlarmsOver(NamedTuple):
+    """A state has lost these flags, and the alarms that hung on them are over."""
+
+    key: StateKey
+    flags: int
+    t_ns: int
+    is_muted: bool
+
+
+Happening = Draft | StartBegan | StartClosed | AlarmsOver
 
 States = dict[StateKey, StateValue | None]
 """New states by key; None: the state ends."""

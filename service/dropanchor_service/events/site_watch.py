@@ -1,7 +1,7 @@
 """What happens to the tags of one site becomes events, states and stays."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +10,17 @@ from dropanchor_schemas.events import RetractionReason
 from dropanchor_schemas.zones import BatteryLowRule, TooCloseRule
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.events.describe import pair_event, tag_event, zone_event
-from dropanchor_service.events.drafts import Happening, StartBegan, StartClosed, StateKey, States, StateValue, Stay
+from dropanchor_service.events.drafts import (
+    Draft,
+    Happening,
+    StartBegan,
+    StartClosed,
+    StateKey,
+    States,
+    StateValue,
+    Stay,
+)
+from dropanchor_service.events.open_alarms import ANY, OpenAlarms
 from dropanchor_service.events.open_starts import OpenStarts, verdict_on
 from dropanchor_service.store import HealthTable, SiteStore, TagTable
 from dropanchor_service.store.starts import StartNews, StartPhase
@@ -27,8 +37,8 @@ ACTIVE = StateValue(1, 0)
 class WatchedSite:
     """What the watcher reads of a site.
 
-    states, starts: what was stored, so that nothing that is known becomes an event again, and so that events can be
-    retracted.
+    states, starts, alarms: what was stored, so that nothing that is known becomes an event again, so that events can be
+    retracted, and so that alarms end.
     """
 
     store: SiteStore
@@ -37,6 +47,7 @@ class WatchedSite:
     items: ZoneItems
     states: Mapping[StateKey, StateValue] = field(default_factory=dict)
     starts: Mapping[str, StartBegan] = field(default_factory=dict)
+    alarms: Mapping[StateKey, int] = field(default_factory=dict)
 
 
 class SiteWatch:
@@ -61,6 +72,7 @@ class SiteWatch:
         self._now_ns = now_ns
         self._on_change = on_change
         self._states = dict(site.states)
+        self._alarms = OpenAlarms(site.items, site.alarms)
         self._versions: object = None
         self._pairs: dict[str, PairWatch] = {}
         self._tag_rules: dict[str, TagWatch] = {}
@@ -98,6 +110,8 @@ class SiteWatch:
         zones, rules = items.zones.all, items.rules.all
         for key in [key for key in self._states if key.item not in (zones if key.source == "zone" else rules)]:
             self._forget(key)
+        for key, flags in self._alarms.lowered().items():
+            self._end_alarms(key, flags)
         self._zones.set_zones(list(zones.values()), groups, self._index)
         self._pairs = {n: PairWatch(rule, groups) for n, rule in rules.items() if isinstance(rule, TooCloseRule)}
         self._tag_rules = {n: TagWatch(r, groups) for n, r in rules.items() if not isinstance(r, TooCloseRule)}
@@ -119,10 +133,12 @@ class SiteWatch:
                 self._restore(key)
 
     def forget_tag(self, name: str) -> None:
-        """End the stays of a tag that was deleted."""
+        """End the stays and alarms of a tag that was deleted."""
         self._close_start(name)
-        for key in [key for key in self._states if key.source == "zone" and key.tag == name]:
-            self._forget(key)
+        for key in [key for key in self._states if name in (key.tag, key.other)]:
+            if key.source == "zone":
+                self._forget(key)
+            self._end_alarms(key, ANY)
 
     def note(self, change: ZoneChange) -> None:
         """Note what has happened to a tag in a zone."""
@@ -132,9 +148,8 @@ class SiteWatch:
             self._set(key, StateValue(change.flags, change.entered_ns))
         else:
             self._end(key, change.left_ns)
-        event = zone_event(change, self._name_of)
-        if event is not None:
-            self.happened.append(event)
+        if (event := zone_event(change, key)) is not None:
+            self._happen(event)
 
     def has_start(self, tag: str) -> bool:
         """Return whether the tag has a start that ranges may still deny, and on which events may hang."""
@@ -162,7 +177,7 @@ class SiteWatch:
                 self._set(key, StateValue(1, change.since_ns) if change.is_close else None)
                 if change.is_close:
                     self._hang(key.tag, key.other)
-                    self.happened.append(pair_event(watch.rule, change, now_ns, self._name_of))
+                    self._happen(pair_event(watch.rule, change, key, now_ns))
 
     def judge_tags(self, states: Array, now_ns: int) -> None:
         """Judge the rules for single tags. states: by row of any site."""
@@ -172,22 +187,19 @@ class SiteWatch:
                 key = StateKey("rule", watch.rule.id, self._names[change.place])
                 self._set(key, ACTIVE if change.is_on else None)
                 if change.is_on:
-                    self.happened.append(tag_event(watch.rule, change, fleet, now_ns, self._names))
+                    self._happen(tag_event(watch.rule, change, key, fleet, now_ns))
 
     def _batteries(self) -> Array:
         if not any(isinstance(watch.rule, BatteryLowRule) for watch in self._tag_rules.values()):
             return np.full(len(self._rows), np.nan)
-        return np.fromiter(self._each_battery(), np.float64, len(self._rows))
-
-    def _each_battery(self) -> Iterator[float]:
-        for row in self._rows:
-            record = self._site.health.of(row)
-            yield np.nan if record is None else record.values.get("battery_fraction", np.nan)
+        records = map(self._site.health.of, self._rows)
+        known = [{} if record is None else record.values for record in records]
+        return np.array([values.get("battery_fraction", np.nan) for values in known], np.float64)
 
     def _zones_of(self, tag: str) -> dict[str, StateValue]:
         """Return the zones in which a tag is."""
-        keys = (StateKey("zone", zone, tag) for zone in self._site.items.zones.all)
-        return {key.item: self._states[key] for key in keys if key in self._states}
+        zones = self._site.items.zones.all
+        return {zone: self._states[key] for zone in zones if (key := StateKey("zone", zone, tag)) in self._states}
 
     def _hang(self, *tags: str) -> None:
         """Note the starts that an event of these tags hangs on. Call this before the event."""
@@ -228,7 +240,20 @@ class SiteWatch:
     def _name_of(self, row: int) -> str:
         return self._tags.at(row).name
 
-    def _set(self, key: StateKey, value: StateValue | None) -> None:
+    def _happen(self, event: Draft) -> None:
+        self.happened.append(event)
+        if event.alarm is not None:
+            self._alarms.begin(event.alarm)
+
+    def _end_alarms(self, key: StateKey, lost: int, t_ns: int | None = None) -> None:
+        """End the alarms that hang on flags that a state has lost. t_ns: when; None: now."""
+        if (over := self._alarms.end(key, lost, self._now_ns() if t_ns is None else t_ns)) is not None:
+            self.happened.append(over)
+            self._on_change()
+
+    def _set(self, key: StateKey, value: StateValue | None, t_ns: int | None = None) -> None:
+        """Note a new state; None: it ends. t_ns: when; None: now."""
+        self._end_alarms(key, ANY if value is None else ~value.flags, t_ns)
         self.states[key] = value
         if value is None:
             self._states.pop(key, None)
@@ -241,7 +266,7 @@ class SiteWatch:
         value = self._states.get(key)
         if value is not None and key.source == "zone":
             self.stays.append(Stay(key.tag, key.item, value.since_ns, max(left_ns, value.since_ns)))
-        self._set(key, None)
+        self._set(key, None, left_ns)
 
     def _forget(self, key: StateKey) -> None:
         """End a state for another reason than the tag's way: a tag counts in its zone until it was last seen there."""

@@ -5,13 +5,25 @@ import uuid
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from threading import Lock
 from typing import Any, NamedTuple
 
 import orjson
 
+from dropanchor_schemas.alarms import Acknowledgement
 from dropanchor_schemas.events import EventData
+from dropanchor_service.events.alarms import acknowledge, begin_alarm, end_alarms, end_retracted, prune_alarms
 from dropanchor_service.events.database import Database
-from dropanchor_service.events.drafts import Draft, Happening, StartBegan, StateKey, States, StateValue, Stay
+from dropanchor_service.events.drafts import (
+    AlarmsOver,
+    Draft,
+    Happening,
+    StartBegan,
+    StateKey,
+    States,
+    StateValue,
+    Stay,
+)
 from dropanchor_service.events.starts import add_start, close_start, starts_of
 from dropanchor_service.events.stays import add_stays, prune_stays
 from dropanchor_service.events.trail import prune_changes
@@ -49,6 +61,8 @@ class Selection:
     types: Sequence[str] = ()
     zones: Sequence[str] = ()
     since_ns: int | None = None
+    to_ns: int | None = None
+    before: int | None = None
 
     def where(self) -> tuple[str, list[Any]]:
         """Return the condition in SQL and its values."""
@@ -57,9 +71,11 @@ class Selection:
             if names:
                 parts.append(f"{column} IN ({','.join('?' * len(names))})")
                 values += names
-        if self.since_ns is not None:
-            parts.append("t_ns >= ?")
-            values.append(self.since_ns)
+        bounds = (("t_ns >= ?", self.since_ns), ("t_ns <= ?", self.to_ns), ("sequence < ?", self.before))
+        for condition, value in bounds:
+            if value is not None:
+                parts.append(condition)
+                values.append(value)
         return " AND ".join(parts), values
 
 
@@ -78,6 +94,7 @@ class EventStore:
         """The sequence of the newest event. Readers poll it."""
         self.dropped_deliveries = 0
         self._told: list[Callable[[], None]] = []
+        self._telling = Lock()
 
     def on_commit(self, told: Callable[[], None]) -> None:
         """Call this after every commit of events, on the thread that makes it."""
@@ -97,10 +114,22 @@ class EventStore:
                 [key for key, value in states.items() if value is None],
             )
             add_stays(connection, stays)
-        self.newest = following - 1
-        for told in self._told if following > first else ():
-            told()
+        self._tell(following - 1)
         return following - first
+
+    def acknowledge(self, alarm: str, said: Acknowledgement) -> None:
+        """Store that somebody has seen an alarm, and the event of it. Raises KeyError where there is none."""
+        with self.database.transaction() as connection:
+            first = int(connection.execute(_NEWEST).fetchone()[0]) + 1
+            self._add(connection, [acknowledge(connection, alarm, said)], first)
+        self._tell(first)
+
+    def _tell(self, newest: int) -> None:
+        """Tell of events up to this one. Two threads may do so in any order."""
+        with self._telling:
+            is_news, self.newest = newest > self.newest, max(newest, self.newest)
+        for told in self._told if is_news else ():
+            told()
 
     def _add_all(self, connection: sqlite3.Connection, happened: Sequence[Happening], following: int) -> int:
         """Store what happened, in order, from this sequence on. Return the one that follows."""
@@ -112,8 +141,11 @@ class EventStore:
             following, drafts = self._add(connection, drafts, following), []
             if isinstance(one, StartBegan):
                 add_start(connection, one, following)
+            elif isinstance(one, AlarmsOver):
+                drafts = end_alarms(connection, one)
             else:
                 drafts = close_start(connection, one)
+                drafts += end_retracted(connection, drafts)
         return self._add(connection, drafts, following)
 
     def _add(self, connection: sqlite3.Connection, drafts: Sequence[Draft], first: int) -> int:
@@ -123,6 +155,9 @@ class EventStore:
             for number, draft in enumerate(drafts, first)
         ]
         connection.executemany("INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)", rows)
+        for draft, (number, *_, body) in zip(drafts, rows, strict=True):
+            if draft.alarm is not None:
+                begin_alarm(connection, draft.alarm, number, body)
         connection.executemany(
             "INSERT INTO deliveries (destination, sequence) VALUES (?, ?)",
             [
@@ -195,6 +230,7 @@ class EventStore:
             prune_changes(connection, end_ns if oversized else keep_from_ns)
             if end is None:
                 return 0
+            prune_alarms(connection, end)
             self.dropped_deliveries += connection.execute(
                 "DELETE FROM deliveries WHERE sequence <= ? AND dead IS NULL", (end,)
             ).rowcount

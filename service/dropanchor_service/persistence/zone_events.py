@@ -15,6 +15,7 @@ from dropanchor_service.delivery.queue import Patience
 from dropanchor_service.delivery.receiver_networks import ReceiverNetworks, open_networks
 from dropanchor_service.delivery.registry import addressees, open_destinations
 from dropanchor_service.delivery.thread import DeliveryThread, Outbox
+from dropanchor_service.events.alarms import open_alarms
 from dropanchor_service.events.database import Database
 from dropanchor_service.events.deliveries import Deliveries
 from dropanchor_service.events.site_watch import WatchedSite
@@ -96,7 +97,8 @@ class ZoneEvents:
             database = Database(folder, self._recovery)
             self._closing.callback(database.close)
             store = EventStore(database, site.id, partial(addressees, destinations))
-            watched = WatchedSite(site.store, site.tags, site.health, items, store.states(), store.starts())
+            stored = store.states(), store.starts(), open_alarms(database)
+            watched = WatchedSite(site.store, site.tags, site.health, items, *stored)
         except NewerFileError as error:
             raise SettingsError(f"data_dir: {error}") from error
         except (OSError, ValueError, sqlite3.Error) as error:

@@ -16,7 +16,7 @@ NEAR: Final = 4.0  # standard deviations: a zone that is farther away cannot hol
 SLOWER: Final = 0.9  # of the limit: below it, a tag can be too fast again
 
 INSIDE, DWELT, TOO_FAST = 1, 2, 4  # flags of a tag in a zone
-ENTER, EXIT, DWELL, SPEED = 0, 1, 2, 3  # kinds of Change
+ENTER, EXIT, DWELL, SPEED, SLOW = 0, 1, 2, 3, 4  # kinds of Change; SLOW: no longer too fast
 PER_PAIR: Final = 3  # changes that one pose can cause in one zone
 
 STAY = np.dtype(
@@ -155,8 +155,11 @@ def _follow(
     if zones.dwell_ns[z] >= 0 and not stay.flags & DWELT and now - stay.since_ns >= zones.dwell_ns[z]:
         stay.flags |= DWELT
         count = _note(changes, count, DWELL, stay.since_ns, inside)
+    was_too_fast = stay.flags & TOO_FAST
     if _became_too_fast(stay, speed, zones.speed[z], now, continues, delay_ns):
         count = _note(changes, count, SPEED, stay.fast_ns, inside)
+    elif was_too_fast and not stay.flags & TOO_FAST:
+        count = _note(changes, count, SLOW, now, inside)
     return count
 
 

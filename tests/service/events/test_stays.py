@@ -10,7 +10,7 @@ from dropanchor_service.estimation.columns import State
 from dropanchor_service.events.database import Database
 from dropanchor_service.events.drafts import Draft, Stay
 from dropanchor_service.events.stays import times_in_zones
-from support.events import EventBench, S, circle
+from support.events import EventBench, S, circle, make_older
 
 
 def seconds(bench: EventBench, tag: str = "a", zone: str = "dock", from_ns: int = 0) -> float:
@@ -101,14 +101,7 @@ def test_the_events_of_an_older_file_become_stays(tmp_path: Path) -> None:
     ]
     drafts = [Draft(kind, "a", {"t_ns": (at + 1) * S, "since_ns": at * S, "zone": "dock"}) for kind, at in happened]
     bench.store.commit(drafts, {})
-    with bench.database.transaction() as connection:
-        connection.execute("DROP TABLE stays")
-        connection.execute("DROP TABLE starts")
-        connection.execute("DROP TABLE changes")
-        connection.execute("DROP INDEX dead_letters")
-        connection.execute("ALTER TABLE deliveries DROP COLUMN again_ns")
-        connection.execute("PRAGMA user_version = 2")
-    bench.database.close()
+    make_older(bench.database, 2)
     database = Database(tmp_path)
     assert times_in_zones(database, 0, 100 * S, {}) == {("a", "dock"): (6 * S, 1)}
     database.close()

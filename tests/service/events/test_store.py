@@ -11,7 +11,7 @@ from dropanchor_service.events.database import FILE_NAME, VERSION, Database, Eve
 from dropanchor_service.events.deliveries import Deliveries
 from dropanchor_service.events.drafts import Draft
 from dropanchor_service.events.store import EventStore, Selection
-from support.events import EventBench, S, circle
+from support.events import EventBench, S, circle, make_older
 
 
 def draft(tag: str, t_ns: int = S, **data: object) -> Draft:
@@ -118,15 +118,7 @@ def test_a_damaged_file_is_moved_aside_and_another_version_is_refused(tmp_path: 
 def test_the_queues_of_an_older_file_go_on(tmp_path: Path) -> None:
     bench = EventBench(tmp_path, addressees=["hook"])
     bench.store.commit([draft("a")], {})
-    with bench.database.transaction() as connection:
-        connection.execute("ALTER TABLE deliveries RENAME destination TO webhook")
-        connection.execute("DROP TABLE stays")
-        connection.execute("DROP TABLE starts")
-        connection.execute("DROP TABLE changes")
-        connection.execute("DROP INDEX dead_letters")
-        connection.execute("ALTER TABLE deliveries DROP COLUMN again_ns")
-        connection.execute("PRAGMA user_version = 1")
-    bench.database.close()
+    make_older(bench.database, 1)
     database = Database(tmp_path)
     assert Deliveries(database).states()["hook"].pending == 1
     assert Deliveries(database).next_chance("hook") is None

@@ -15,7 +15,7 @@ from dropanchor_service.events.store import EventStore
 from dropanchor_service.events.trail import ChangeTrail, Wanted
 from dropanchor_service.store import SiteStore
 from dropanchor_service.zones.items import ZoneItems
-from support.events import circle
+from support.events import circle, make_older
 
 S = 1_000_000_000
 
@@ -122,10 +122,7 @@ def test_changes_are_kept_as_long_as_events(tmp_path: Path) -> None:
 def test_an_older_file_gets_a_trail(tmp_path: Path) -> None:
     older = Database(tmp_path)
     EventStore(older, "yard").commit([event()], {})
-    with older.transaction() as connection:
-        connection.execute("DROP TABLE changes")
-        connection.execute("PRAGMA user_version = 5")
-    older.close()
+    make_older(older, 5)
     bench = Bench(tmp_path)
     bench.site.set_anchor(Anchor(id="7"))
     assert bench.noted() == [("anchor", "7", True)]

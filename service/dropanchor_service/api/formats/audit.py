@@ -20,15 +20,16 @@ def json_lines(entries: Iterable[dict[str, Any]]) -> Iterator[bytes]:
 
 def csv_lines(entries: Iterable[dict[str, Any]]) -> Iterator[bytes]:
     """Yield a table with what was before and after as JSON."""
-    yield _line(COLUMNS)
+    yield line(COLUMNS)
     for entry in entries:
         who = (entry["by"]["source"], plain(entry["by"]["name"]))
         values = (to_json(entry[name]).decode() for name in ("before", "after"))
         what = (entry["kind"], plain(entry["item"]), *values)
-        yield _line((entry["number"], iso_utc(entry["t_ns"]), *who, *what, entry["confirmed"]))
+        yield line((entry["number"], iso_utc(entry["t_ns"]), *who, *what, entry["confirmed"]))
 
 
-def _line(cells: Iterable[Any]) -> bytes:
+def line(cells: Iterable[Any]) -> bytes:
+    """Return one line of a CSV file."""
     text = io.StringIO(newline="")
     csv.writer(text).writerow(cells)
     return text.getvalue().encode()

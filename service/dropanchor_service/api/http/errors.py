@@ -37,6 +37,7 @@ class Kind(Enum):
     UNKNOWN_ANCHOR = (404, "The anchor is unknown")
     UNKNOWN_ZONE = (404, "The zone is unknown")
     UNKNOWN_RULE = (404, "The rule is unknown")
+    UNKNOWN_ALARM = (404, "The alarm is unknown")
     UNKNOWN_SHARE = (404, "The share link is unknown")
     UNKNOWN_KEY = (404, "The API key is unknown")
     UNKNOWN_DESTINATION = (404, "The destination is unknown")

@@ -33,6 +33,7 @@ _BY_LINKS_TO_TAGS = (
 _BY_LINKS = (
     *("sites", "sites/poses", "anchors", "anchors/{}", "tags/{}/explain"),
     *("zones", "zones/{}", "zone-occupancy", "event-rules", "event-rules/{}", "events", "events/stream"),
+    *("alarms", "events/file"),
     "history/coverage",
     *("plans", "plans/{}", "plan-images/{}", "basemap", "basemap/{}/{}/{}"),
 )

@@ -14,7 +14,7 @@ from dropanchor_schemas.site import Id
 from dropanchor_service.api.formats.audit import csv_lines, json_lines
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.http.router import Router
-from dropanchor_service.api.routes.contents import TEXT
+from dropanchor_service.api.routes.contents import TEXT, file_response
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.parameters import TimeNs, example_response, json_response, words_of
 from dropanchor_service.api.routes.period import require_order
@@ -110,14 +110,9 @@ def list_changes(query: Annotated[AuditQuery, Query()], request: Request) -> Res
 def get_changes_file(query: Annotated[AuditFileQuery, Query()], request: Request) -> Response:
     pages = _pages(parts_of(request).events.trail, query.wanted(request))
     entries = chain(next(pages), chain.from_iterable(pages))  # what cannot be read is refused before it begins
-    lines, media_type = (
-        (csv_lines(entries), "text/csv") if query.format == "csv" else (json_lines(entries), "application/jsonl")
-    )
-    headers = {
-        "cache-control": "no-store",
-        "content-disposition": f'attachment; filename="changes.{query.format}"',
-    }
-    return StreamingResponse(lines, media_type=media_type, headers=headers)
+    if query.format == "csv":
+        return file_response(csv_lines(entries), "changes.csv", "text/csv")
+    return file_response(json_lines(entries), "changes.jsonl", "application/jsonl")
 
 
 def _pages(trail: ChangeTrail, wanted: Wanted) -> Iterator[list[dict[str, Any]]]:

@@ -13,7 +13,11 @@ ZONE: dict[str, Any] = {
     "exit": True,
     "dwell_s": 300.0,
     "speed_mps": 2.0,
+    "enter_severity": "event",
+    "dwell_severity": "event",
+    "speed_severity": "alarm",
     "delay_s": 1.0,
+    "muted_until_ns": None,
 }
 OCCUPANCY: dict[str, Any] = {"zones": [{"zone": "dock", "tags": 3}]}
 RULE: dict[str, Any] = {
@@ -22,8 +26,10 @@ RULE: dict[str, Any] = {
     "id": "apart",
     "name": "Keep apart",
     "type": "too_close",
+    "severity": "warning",
     "distance_m": 3.0,
     "delay_s": 1.0,
+    "muted_until_ns": None,
 }
 EVENT: dict[str, Any] = {
     "specversion": "1.0",
@@ -48,6 +54,19 @@ EVENT: dict[str, Any] = {
         "speed_mps": 1.1,
         "battery_fraction": None,
     },
+}
+ALARM: dict[str, Any] = {
+    "id": EVENT["id"],
+    "severity": "alarm",
+    "began_ns": 1_799_999_999_000_000_000,
+    "over_ns": None,
+    "acknowledged": {
+        "by": {"source": "key", "name": "anna"},
+        "t_ns": 1_800_000_060_000_000_000,
+        "note": "the driver has been told",
+    },
+    "muted_until_ns": None,
+    "event": EVENT | {"data": EVENT["data"] | {"severity": "alarm"}},
 }
 EVENTS: dict[str, Any] = {"events": [EVENT], "next": None}
 SECRET = "whsec_ZHJvcGFuY2hvci1leGFtcGxlLXNlY3JldC0wMQ=="

@@ -6,8 +6,10 @@ import sqlite3
 import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from itertools import chain
 from threading import Event as ThreadEvent
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import orjson
 from fastapi import Depends, Header, Query, Request
@@ -15,9 +17,11 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from starlette.responses import Response, StreamingResponse
 
 from dropanchor_schemas.events import EventList, EventType
+from dropanchor_service.api.formats.events import csv_lines
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import event_examples as examples
+from dropanchor_service.api.routes.contents import TEXT, file_response
 from dropanchor_service.api.routes.parameters import (
     COMMA,
     Ids,
@@ -58,19 +62,39 @@ class EventFilter(TagFilter):
         default=None, description="Return events that follow the one with this `sequence`."
     )
 
-    def selection(self, since_ns: int | None = None) -> Selection:
-        return Selection(self.tags, [kind.value for kind in self.types], self.zones, since_ns)
+    def selection(self) -> Selection:
+        return Selection(self.tags, [kind.value for kind in self.types], self.zones)
 
     def position(self) -> int | None:
         return None if self.after is None else min(int(self.after), MAX_SEQUENCE)
 
 
-class EventQuery(EventFilter):
+class EventPeriod(EventFilter):
     since: TimeNs | None = Field(
         default=None,
         description="Return events from this time on, UTC in ns, or ISO 8601 with a time zone; the oldest first.",
     )
+    to: TimeNs | None = Field(default=None, description="Return events up to this time.")
+
+    def selection(self) -> Selection:
+        return replace(super().selection(), since_ns=self.since, to_ns=self.to)
+
+
+class EventQuery(EventPeriod):
+    before: Annotated[str, Field(pattern=SEQUENCE)] | None = Field(
+        default=None,
+        description="Return the newest events before the one with this `sequence`: the first of a page leads to those "
+        "before it.",
+    )
     limit: int = Field(default=100, ge=1, le=MAX_EVENTS, description="How many events to return.")
+
+    def selection(self) -> Selection:
+        before = None if self.before is None else min(int(self.before), MAX_SEQUENCE)
+        return replace(super().selection(), before=before)
+
+
+class EventFileQuery(EventPeriod):
+    format: Literal["csv", "jsonl"] = Field(default="csv", description="CSV, or JSON lines: an event in each.")
 
 
 def _event_stream() -> dict[int | str, dict[str, Any]]:
@@ -80,7 +104,7 @@ def _event_stream() -> dict[int | str, dict[str, Any]]:
 
 async def _refuse_repeated(request: Request) -> None:
     """Refuse a parameter that takes one value but has several."""
-    for name in ("after", "since", "limit"):
+    for name in ("after", "before", "since", "to", "limit"):
         if len(request.query_params.getlist(name)) > 1:
             raise ProblemError(Kind.INVALID_REQUEST, f"query.{name}: is given more than once")
 
@@ -96,22 +120,49 @@ router = Router(tags=["events"], dependencies=[Depends(_refuse_repeated)])
 @router.get(
     "/events",
     summary="List stored events",
-    description="With `since` or `after`, the page begins there and `next` leads on. Without them, it holds the "
-    "newest events. Events are always in order.",
+    description="With `since` or `after`, the page begins there and `next` leads on. Without them, or with `before`, "
+    "it holds the newest events. Events are always in order.",
     response_model=EventList,
     responses=example_response(examples.EVENTS) | problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE),
 )
 def list_events(query: Annotated[EventQuery, Query()], request: Request) -> Response:
     store = parts_of(request).events.store
-    selection, after = query.selection(query.since), query.position()
+    selection, after = query.selection(), query.position()
     with reading():
-        if query.since is None and after is None:
+        if query.before is not None or (query.since is None and after is None):
             found, leads_on = store.last(query.limit, selection), False
         else:
             found = store.after(after or 0, query.limit, selection)
             leads_on = len(found) == query.limit
     following = f"{found[-1].sequence:020}" if leads_on else None
     return json_response({"events": [orjson.Fragment(event.body) for event in found], "next": following})
+
+
+@router.get(
+    "/events/file",
+    summary="Download stored events, as CSV or JSON lines",
+    response_class=StreamingResponse,
+    responses=problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE)
+    | {200: {"content": {"application/jsonl": TEXT, "text/csv": TEXT}}},
+)
+def get_events_file(query: Annotated[EventFileQuery, Query()], request: Request) -> Response:
+    pages = _pages(parts_of(request).events.store, query)
+    bodies = chain(next(pages), chain.from_iterable(pages))  # what cannot be read is refused before it begins
+    if query.format == "csv":
+        return file_response(csv_lines(map(orjson.loads, bodies)), "events.csv", "text/csv")
+    return file_response((body + b"\n" for body in bodies), "events.jsonl", "application/jsonl")
+
+
+def _pages(store: EventStore, query: EventFileQuery) -> Iterator[list[bytes]]:
+    """Yield all events, page by page. Raises ProblemError."""
+    position, selection = query.position() or 0, query.selection()
+    while True:
+        with reading():
+            found = store.after(position, MAX_EVENTS, selection)
+        yield [event.body for event in found]
+        if len(found) < MAX_EVENTS:
+            return
+        position = found[-1].sequence
 
 
 @router.get(

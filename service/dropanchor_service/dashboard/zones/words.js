@@ -16,7 +16,8 @@ import { has, t, timeText } from "../i18n/language.js";
  * @property {{t_ns: number, since_ns: number, zone: string | null, rule: string | null, name: string,
  *   probability: number | null, other_tag: string | null, distance_m: number | null, speed_mps: number | null,
  *   battery_fraction: number | null, retracts?: string | null, retracted_type?: string | null,
- *   reason?: string | null}} data
+ *   reason?: string | null, severity?: string | null, alarm?: string | null, alarm_type?: string | null,
+ *   acknowledged_by?: string | null, note?: string | null}} data
  */
 
 /** Return what happened, such as `cart-3 entered Yard`. @param {ServiceEvent} event */
@@ -26,9 +27,13 @@ export function sentence({ type, subject, data }) {
   return t(key, {
     tag: subject, place: data.name || data.zone || data.rule || "", other: data.other_tag ?? "",
     time: age((data.t_ns - data.since_ns) / 1e9), speed: speed(data.speed_mps, 1), distance: length(data.distance_m, 1),
-    battery: percent(data.battery_fraction), why: why(data.reason),
-  });
+    battery: percent(data.battery_fraction), why: why(data.reason), before: kind(data.alarm_type),
+    who: data.acknowledged_by ? `(${data.acknowledged_by})` : "", note: data.note ?? "",
+  }).trim();
 }
+
+/** Return what kind of event this is, in words. @param {string | null} [type] */
+export const kind = (type) => (type && has(`notify.${type}`) ? t(`notify.${type}`) : type ?? "");
 
 /** Return why an event is not true, in words. @param {string | null} [reason] */
 export const why = (reason) => (reason && has(`event.why.${reason}`) ? t(`event.why.${reason}`) : reason ?? "");

@@ -12,10 +12,13 @@ import pytest
 from fastapi import FastAPI
 
 from dropanchor_schemas.audit import AuditKind, AuditList
+from dropanchor_schemas.events import EventType
 from dropanchor_schemas.shares import ShareRequest
 from dropanchor_schemas.site import Georeference, TagSettings
 from dropanchor_service.api.omlox.routes.fences import EXAMPLE as FENCE
 from dropanchor_service.api.routes import event_examples
+from dropanchor_service.delivery.event_parts import EventParts
+from dropanchor_service.events.drafts import AlarmBegan, Draft, StateKey
 from dropanchor_service.security import api_keys, share_links
 from dropanchor_service.security.api_keys import ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
@@ -65,7 +68,12 @@ def audited(tmp_path: Path) -> Audited:
     secrets = {scope.word: keys.add(scope.word, scope) for scope in Scope}
     secrets["link"] = links.add("default", ShareRequest())[1]
     authenticator = Authenticator({share_links.SOURCE: links, api_keys.SOURCE: keys})
-    return Audited(bench.app(authenticator=authenticator, omlox=OmloxItems.opened(None)), bench, secrets)
+    events = EventParts.in_memory("default", lambda: bench.now_ns)
+    lost = {"t_ns": T_NS, "since_ns": T_NS, "rule": "lost", "severity": "alarm"}
+    alarm = AlarmBegan(StateKey("rule", "lost", "tag-1"), 1)
+    events.store.commit([Draft(EventType.TAG_LOST, "tag-1", lost, alarm)], {})
+    app = bench.app(authenticator=authenticator, omlox=OmloxItems.opened(None), events=events)
+    return Audited(app, bench, secrets)
 
 
 def writing() -> Iterator[tuple[str, str, dict[str, Any]]]:
@@ -100,7 +108,7 @@ def filled(path: str, operation: dict[str, Any], made: dict[str, Any]) -> str:
 
 
 def test_every_route_that_writes_leaves_an_entry(audited: Audited) -> None:
-    made: dict[str, Any] = {}
+    made: dict[str, Any] = {"alarm": audited.ask("GET", "/api/v1/alarms").json()["alarms"][0]["id"]}
     kinds = set()
     for method, path, operation in writing():
         name = operation["operationId"]

@@ -55,20 +55,24 @@ def test_events_are_asked_for_from_an_iso_time_on(since: str) -> None:
     assert "query.since" in ask(app, "GET", "/api/v1/events?since=yesterday").text
 
 
-TIME_PARAMETERS = [
-    f"{path}?{name}="
-    for path in (
-        "tags/a/track",
-        "tags/a/track/file",
-        "tracks",
-        "heat-map",
-        "figures",
-        "history/coverage",
-        "audit",
-        "audit/file",
-    )
-    for name in ("from", "to")
-] + ["tags/a/pose?at=", "events?since="]
+TIME_PARAMETERS = (
+    [
+        f"{path}?{name}="
+        for path in (
+            "tags/a/track",
+            "tags/a/track/file",
+            "tracks",
+            "heat-map",
+            "figures",
+            "history/coverage",
+            "audit",
+            "audit/file",
+        )
+        for name in ("from", "to")
+    ]
+    + ["tags/a/pose?at="]
+    + [f"{path}?{name}=" for path in ("events", "events/file") for name in ("since", "to")]
+)
 
 
 @pytest.mark.parametrize("parameter", TIME_PARAMETERS)

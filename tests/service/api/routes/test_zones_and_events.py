@@ -9,11 +9,12 @@ import pytest
 from fastapi import FastAPI
 from prometheus_client import CollectorRegistry
 
-from dropanchor_schemas.events import EventList, EventType
+from dropanchor_schemas.alarms import AlarmList
+from dropanchor_schemas.events import Event, EventList, EventType
 from dropanchor_service.api import create_app
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.delivery.event_parts import EventParts
-from dropanchor_service.events.drafts import Draft, StateKey, StateValue
+from dropanchor_service.events.drafts import AlarmBegan, AlarmsOver, Draft, StateKey, StateValue
 from dropanchor_service.zones.items import ZoneItems
 from support.api import ApiBench, ask, kind_of, make_api_bench
 from support.http_server import running_server
@@ -121,8 +122,50 @@ def test_events_come_in_pages_and_by_filter() -> None:
     assert found(types="dropanchor.zone.exit").events == []
     assert found(zones="gate").events == []
     assert found(since=6).events == []
+    assert found(to=4).events == []
+    assert [int(event.sequence) for event in found(limit=2, before=4).events] == [2, 3]
+    table = ask(app, "GET", "/api/v1/events/file", params={"tags": "a", "since": 5, "to": 5}).text.splitlines()
+    assert [line.split(",")[0] for line in table] == ["sequence", *(f"{number:020}" for number in (1, 3, 5))]
+    lines = ask(app, "GET", "/api/v1/events/file?format=jsonl&types=dropanchor.zone.enter").text.splitlines()
+    assert [Event.model_validate_json(line).subject for line in lines] == ["a", "b", "a", "c", "a"]
     assert kind_of(ask(app, "GET", "/api/v1/events", params={"after": "x"})) == "invalid-request"
     assert kind_of(ask(app, "GET", "/api/v1/events?after=1&after=2")) == "invalid-request"
+
+
+def test_alarms_are_listed_and_acknowledged_and_the_trail_names_who_did() -> None:
+    parts = EventParts.in_memory("yard")
+    app = app_of(parts)
+    ask(app, "PUT", "/api/v1/zones/dock", json=ZONE | {"muted_until_ns": 7})
+    for tag in ("a", "b"):
+        key = StateKey("zone", "dock", tag)
+        data = {"t_ns": 5, "since_ns": 4, "zone": "dock", "severity": "alarm"}
+        parts.store.commit([Draft(EventType.ZONE_ENTER, tag, data, AlarmBegan(key, 1))], {})
+
+    def listed(**query: Any) -> list[str]:
+        found = AlarmList.model_validate(ask(app, "GET", "/api/v1/alarms", params=query).json())
+        return [f"{one.event.subject} {one.over_ns} {one.muted_until_ns}" for one in found.alarms]
+
+    assert listed() == ["b None 7", "a None 7"]
+    parts.store.commit([AlarmsOver(StateKey("zone", "dock", "b"), 1, 9, is_muted=False)], {})
+    assert (listed(), listed(state="open")) == (["b 9 7", "a None 7"], ["a None 7"])
+    page = ask(app, "GET", "/api/v1/alarms?limit=1").json()
+    assert listed(before=page["next"]) == listed(tags="a") == ["a None 7"]
+    (alarm,) = page["alarms"]
+    path = f"/api/v1/alarms/{alarm['id']}/acknowledgement"
+    for note in ("seen", "the driver knows"):
+        answer = ask(app, "PUT", path, json={"note": note}).json()
+        assert (answer["acknowledged"]["by"], answer["acknowledged"]["note"]) == ({"source": "local", "name": ""}, note)
+    assert (listed(), listed(state="all")) == (["a None 7"], ["b 9 7", "a None 7"])
+    second, first = ask(app, "GET", "/api/v1/audit?kind=alarm").json()["entries"]
+    assert (first["before"], second["before"]["note"], second["item"]) == (None, "seen", alarm["id"])
+    told = EventList.model_validate(ask(app, "GET", "/api/v1/events").json()).events[-1]
+    assert (told.type, told.data.alarm, told.data.note) == (
+        EventType.ALARM_ACKNOWLEDGED,
+        alarm["id"],
+        "the driver knows",
+    )
+    assert kind_of(ask(app, "PUT", "/api/v1/alarms/x/acknowledgement", json={})) == "unknown-alarm"
+    assert kind_of(ask(app, "PUT", path, json={"note": 1})) == "invalid-request"
 
 
 def test_a_stream_begins_after_the_last_id_and_goes_on_with_new_events() -> None:

@@ -38,6 +38,7 @@ export default {
   "trail.kind_tag": "Tag",
   "trail.kind_remote-settings": "Programm des Tags",
   "trail.kind_zone": "Zone",
+  "trail.kind_alarm": "Alarm",
   "trail.kind_rule": "Regel",
   "trail.kind_plan": "Grundriss",
   "trail.kind_plan-image": "Bild eines Grundrisses",

@@ -85,6 +85,8 @@ export default {
   "event.dropanchor.tag.lost": "{tag} ist seit {time} verloren",
   "event.dropanchor.tag.ambiguous": "{tag} ist seit {time} mehrdeutig",
   "event.dropanchor.event.retracted": "Zurückgezogen für {tag} in {place}: {why}",
+  "event.dropanchor.alarm.over": "Vorbei für {tag}: {before} ({time})",
+  "event.dropanchor.alarm.acknowledged": "Quittiert für {tag}: {before} {who} {note}",
   "event.retracted": "zurückgezogen: {why}",
   "event.why.start_denied": "die Distanzen widersprechen dem Startort",
   "event.why.start_taken_back": "der Startort wurde zurückgenommen",

@@ -38,6 +38,7 @@ export default {
   "trail.kind_tag": "tag",
   "trail.kind_remote-settings": "program of the tag",
   "trail.kind_zone": "zone",
+  "trail.kind_alarm": "alarm",
   "trail.kind_rule": "rule",
   "trail.kind_plan": "floor plan",
   "trail.kind_plan-image": "image of a floor plan",

@@ -85,6 +85,8 @@ export default {
   "event.dropanchor.tag.lost": "{tag} has been lost for {time}",
   "event.dropanchor.tag.ambiguous": "{tag} has been ambiguous for {time}",
   "event.dropanchor.event.retracted": "Retracted for {tag} in {place}: {why}",
+  "event.dropanchor.alarm.over": "Over for {tag}: {before} ({time})",
+  "event.dropanchor.alarm.acknowledged": "Acknowledged for {tag}: {before} {who} {note}",
   "event.retracted": "retracted: {why}",
   "event.why.start_denied": "the ranges contradict its start",
   "event.why.start_taken_back": "its start was taken back",
