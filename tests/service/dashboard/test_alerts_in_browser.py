@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Browser, Locator, expect
 
 from dropanchor_schemas.destinations import EmailDestination, MqttPosesDestination, WebhookDestination
-from dropanchor_schemas.zones import BatteryLowRule, TooCloseRule
+from dropanchor_schemas.zones import BatteryLowRule, Severity, TooCloseRule
 from dropanchor_service.delivery.signature import key_of
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
@@ -189,10 +189,12 @@ def test_rules_are_made_and_edited_and_those_of_zones_lead_to_the_zone(chromium:
         expect(form.get_by_label("Closer than")).to_be_hidden()
         form.get_by_label("Name").fill("Charge")
         form.get_by_label("Charge below").fill("0.3")
+        expect(form.get_by_label("It makes")).to_have_value("warning")
+        form.get_by_label("It makes").select_option("an alarm")
         form.get_by_role("button", name="Save rule").click()
         expect(form).to_be_hidden()
         assert place.parts.items.rules.all["charge"] == BatteryLowRule(
-            type="battery_low", id="charge", name="Charge", fraction=0.3
+            type="battery_low", id="charge", name="Charge", fraction=0.3, severity=Severity.ALARM
         )
         alerts.get_by_role("button", name="Edit Keep apart").click()
         expect(form.get_by_label("Closer than")).to_have_value("2.5")

@@ -113,7 +113,7 @@ def test_a_question_mark_shows_the_keys_and_keys_go_where_one_types(chromium: Br
         page.keyboard.press("?")
         keys = page.get_by_role("dialog", name="Keyboard")
         expect(keys).to_be_visible()
-        assert keys.locator("dt").count() == keys.locator("dd").count() == 15
+        assert keys.locator("dt").count() == keys.locator("dd").count() == 16
         page.keyboard.press("/")
         expect(page.locator("#filter")).not_to_be_focused()
         page.keyboard.press("Escape")

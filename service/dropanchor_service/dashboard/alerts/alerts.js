@@ -23,13 +23,14 @@ const NEW_DESTINATIONS = {
   mqtt: { ...COMMON, type: "mqtt", topic: "dropanchor/{site}/{tag}/event" },
   mqtt_poses: { enabled: true, zones: [], tags: [], type: "mqtt_poses", prefix: "dropanchor", discovery: "homeassistant", interval_s: 1, deadband_m: 0.1 },
 };
+const SEVERITIES = ["event", "warning", "alarm"];
 const FOR_ALL = { name: "", tags: [], groups: [] };
 /** @type {Record<string, Record<string, any>>} */
 const NEW_RULES = {
-  too_close: { ...FOR_ALL, type: "too_close", distance_m: 3, delay_s: 1 },
-  battery_low: { ...FOR_ALL, type: "battery_low", fraction: 0.2 },
-  lost: { ...FOR_ALL, type: "lost", after_s: 60 },
-  ambiguous: { ...FOR_ALL, type: "ambiguous", after_s: 120 },
+  too_close: { ...FOR_ALL, severity: "alarm", type: "too_close", distance_m: 3, delay_s: 1 },
+  battery_low: { ...FOR_ALL, severity: "warning", type: "battery_low", fraction: 0.2 },
+  lost: { ...FOR_ALL, severity: "alarm", type: "lost", after_s: 60 },
+  ambiguous: { ...FOR_ALL, severity: "warning", type: "ambiguous", after_s: 120 },
 };
 
 export class Alerts {
@@ -49,6 +50,7 @@ export class Alerts {
     this.destinations = new DestinationList(partOf(this.box, "destinations"), store, { edit: (id) => panels.open("destination", () => this.destinationEditor.open(id)), confirm: this.confirm, isLeaving: (id) => changes.isLeaving(store.destinations.path(id)) });
     this.rules = new RuleList(partOf(this.box, "rules"), store, () => zones.store.zones, { edit: (id) => panels.open("rule", () => this.ruleEditor.open(id)), editZone: (id) => zones.edit(id) });
     this.networks = new NetworkList(partOf(this.box, "networks"), store);
+    for (const list of document.querySelectorAll("select[data-severities]")) list.append(...SEVERITIES.map((one) => new Option(t(`severity.${one}`), one)));
     this.#addForms();
     this.#addPanel("destination", this.destinationEditor, (type) => ({ ...NEW_DESTINATIONS[type], ...(type === "webhook" ? { secret: newSecret() } : {}) }));
     this.#addPanel("rule", this.ruleEditor, (type) => NEW_RULES[type]);

@@ -30,7 +30,8 @@ export function ruleWords(rule) {
   const { distance_m, delay_s, after_s, fraction } = rule;
   const words = has(key) ? t(key, { distance: distance(distance_m ?? 0, 4), time: age(delay_s ?? after_s), share: percent(fraction) }) : rule.type;
   const who = [...rule.groups.map((/** @type {string} */ group) => t("rule.group", { group })), ...rule.tags];
-  return t("rule.who", { rule: words, who: who.length === 0 ? t("rule.all") : who.join(", ") });
+  const made = rule.severity && rule.severity !== "event" ? ` → ${t(`severity.${rule.severity}`)}` : "";
+  return t("rule.who", { rule: words + made, who: who.length === 0 ? t("rule.all") : who.join(", ") });
 }
 
 /** Return what a zone watches beside entering and leaving; empty: nothing. @param {import("../zones/zone_store.js").Zone} zone */

@@ -1,10 +1,12 @@
 /** Filter and sort the tags for the table. */
 
-import { BEST_FIRST, STATES } from "./states.js";
+import { BEST_FIRST, STATES, stateNumber } from "./states.js";
 
 /** @typedef {import("./fleet.js").Fleet} Fleet */
 /** @typedef {{column: string, descending: boolean}} Sort */
 
+/** How much trouble a tag is in by its state; none for other states. */
+const TROUBLE = new Map([[stateNumber("degraded"), 1], [stateNumber("lost"), 2]]);
 const RANK_OF = STATES.map((_, state) => BEST_FIRST.indexOf(state));
 
 /** Return a sort key that puts `tag-9` before `tag-10`. @param {string} name */
@@ -19,14 +21,16 @@ export class Order {
 
   /**
    * Return the sorted rows. Unknown values come last in both directions, and equal values are sorted by name.
+   * By name, tags in trouble come first: with alarms, then lost, then degraded ones.
    * @param {Fleet} fleet @param {(row: number) => boolean} wanted @param {Sort} sort @param {number} now_ms
+   * @param {(tag: string) => number} [alarmOf] 2: alarm, 1: warning, 0: neither
    */
-  rows(fleet, wanted, sort, now_ms) {
+  rows(fleet, wanted, sort, now_ms, alarmOf = () => 0) {
     this.#sortNames(fleet);
     const rows = this.#byName.filter(wanted);
     const sign = sort.descending ? -1 : 1;
     const value = valueOf(fleet, sort.column, now_ms);
-    if (!value) return sort.descending ? rows.reverse() : rows;
+    if (!value) return troubledFirst(sort.descending ? rows.reverse() : rows, (row) => 3 * alarmOf(fleet.names[row]) + (TROUBLE.get(fleet.state[row]) ?? 0));
     const values = Float64Array.from({ length: fleet.size }, (_, row) => value(row));
     return rows.sort((a, b) => compare(values[a], values[b], sign) || this.#place[a] - this.#place[b]);
   }
@@ -40,6 +44,15 @@ export class Order {
     this.#place = new Int32Array(fleet.size);
     this.#byName.forEach((row, place) => (this.#place[row] = place));
   }
+}
+
+/** Return the rows with those first that are in the most trouble, and otherwise in the same order.
+ * @param {number[]} rows @param {(row: number) => number} trouble */
+function troubledFirst(rows, trouble) {
+  /** @type {number[][]} */
+  const groups = [];
+  for (const row of rows) (groups[trouble(row)] ??= []).push(row);
+  return groups.reverse().flat();
 }
 
 /** @param {number} a @param {number} b @param {number} sign */

@@ -3,7 +3,7 @@
 import { STATES } from "../data/states.js";
 
 const NAMES = /** @type {const} */ ([
-  "map", "grid", "grid-strong", "ink", "ink-2", "ink-3", "ring", "accent", "anchor",
+  "map", "grid", "grid-strong", "ink", "ink-2", "ink-3", "ring", "accent", "anchor", "alarm", "warning",
   "base-land", "base-green", "base-water", "base-building", "base-road", "base-line",
 ]);
 

@@ -11,15 +11,15 @@ export class Choice extends EventTarget {
   #gathering = false;
   #follow = false;
   #text = "";
-  #onlyCare = false;
+  #only = "";
   #group = "";
   /** @type {Set<number>} */
   hiddenStates = new Set();
 
-  /** @param {(tag: string) => boolean} needsCare */
-  constructor(needsCare = () => false) {
+  /** @param {Record<string, (tag: string) => boolean>} kinds of tags that can be shown alone, by their names */
+  constructor(kinds = {}) {
     super();
-    this.needsCare = needsCare;
+    this.kinds = kinds;
   }
 
   /** The selected tag; null: none, or several. */
@@ -95,13 +95,13 @@ export class Choice extends EventTarget {
     this.#changed();
   }
 
-  /** Whether only tags that need care are shown. */
-  get onlyCare() {
-    return this.#onlyCare;
+  /** The kind of tags that are shown alone, such as those that need care; empty: all are. */
+  get only() {
+    return this.#only;
   }
 
-  set onlyCare(only) {
-    this.#onlyCare = only;
+  set only(kind) {
+    this.#only = kind;
     this.#changed();
   }
 
@@ -116,26 +116,26 @@ export class Choice extends EventTarget {
   }
 
   showAll() {
-    this.filter({ text: "", group: "", onlyCare: false, hidden: [] });
+    this.filter({ text: "", group: "", only: "", hidden: [] });
   }
 
-  /** Set the whole filter. @param {{text: string, group: string, onlyCare: boolean, hidden: number[]}} filter hidden: states */
-  filter({ text, group, onlyCare, hidden }) {
+  /** Set the whole filter. @param {{text: string, group: string, only: string, hidden: number[]}} filter hidden: states */
+  filter({ text, group, only, hidden }) {
     this.#text = text.trim().toLowerCase();
     this.#group = group;
-    this.#onlyCare = onlyCare;
+    this.#only = only;
     this.hiddenStates = new Set(hidden);
     this.#changed();
   }
 
   get isFiltered() {
-    return this.#text !== "" || this.#group !== "" || this.#onlyCare || this.hiddenStates.size > 0;
+    return this.#text !== "" || this.#group !== "" || this.#only !== "" || this.hiddenStates.size > 0;
   }
 
   /** @param {import("../data/fleet.js").Fleet} fleet @param {number} row */
   shows(fleet, row) {
     if (this.hiddenStates.size > 0 && this.hiddenStates.has(fleet.state[row])) return false;
-    if (this.#onlyCare && !this.needsCare(fleet.names[row])) return false;
+    if (this.#only !== "" && !this.kinds[this.#only]?.(fleet.names[row])) return false;
     if (this.#group !== "" && fleet.groups[row] !== this.#group) return false;
     return this.#text === "" || `${fleet.labels[row]}\n${fleet.names[row]}`.toLowerCase().includes(this.#text);
   }

@@ -4,7 +4,7 @@ import { t } from "../i18n/language.js";
 
 /** The keys, with the messages that name those without a sign of their own, and what they do. @type {[string[], string][]} */
 const KEYS = [
-  [["?"], "keys.help"], [["/"], "keys.filter"], [["Esc"], "keys.escape"],
+  [["?"], "keys.help"], [["/"], "keys.filter"], [["A"], "keys.alarm"], [["Esc"], "keys.escape"],
   [["← ↑ → ↓"], "keys.move"], [["+", "−"], "keys.zoom"], [["0"], "keys.fit"], [["Enter"], "keys.measure"],
   [["↑ ↓", "Enter"], "keys.table"], [["keys.ctrl_space", "keys.shift_down"], "keys.several"], [["keys.menu"], "keys.here"], [["keys.space"], "keys.play"],
   [["keys.ctrl_z"], "keys.undo"], [["keys.ctrl_shift_z"], "keys.redo"],

@@ -2,6 +2,8 @@
  * `?kiosk=floors` one floor after another. */
 
 import { addressValues } from "../data/address.js";
+import { timeText } from "../i18n/language.js";
+import { byId, write } from "./parts.js";
 
 const EVERY_S = 10;
 const SHORTEST_S = 2;
@@ -24,6 +26,8 @@ export class Kiosk {
     if (!isKiosk) return;
     document.body.dataset.kiosk = "";
     stayAwake();
+    showTime();
+    setInterval(showTime, 1000);
     document.addEventListener("visibilitychange", stayAwake);
     document.addEventListener("keydown", ({ key }) => key === "Escape" && leave());
     const values = addressValues();
@@ -41,6 +45,11 @@ export class Kiosk {
     this.#shown = all[(all.indexOf(this.#shown) + 1) % all.length];
     show(this.#shown);
   }
+}
+
+/** Show the time of day, by which a glance also tells that the page is alive. */
+function showTime() {
+  write(byId("wall-clock"), timeText(new Date(), { timeStyle: "medium" }));
 }
 
 /** Keep the screen on while the page is visible. A browser that cannot leaves that to the system. */

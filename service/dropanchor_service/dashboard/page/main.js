@@ -2,7 +2,8 @@
 
 import { Alerts } from "../alerts/alerts.js";
 import { Basemap } from "../basemap/basemap.js";
-import { CareChip } from "../panel/care.js";
+import { OnlyChip } from "../panel/only_chip.js";
+import { Alarms } from "../alarms/alarms.js";
 import { Choice } from "./choice.js";
 import { StateChips } from "../panel/chips.js";
 import { chosenSite, Connection } from "../data/connection.js";
@@ -52,12 +53,14 @@ const panels = new Panels(() => confirmed(/** @type {HTMLDialogElement} */ (byId
 const fleet = new Fleet();
 const trails = new Trails();
 const roster = new Roster(fleet);
-const choice = new Choice((tag) => roster.needsCare(tag));
+/** @type {Choice} */
+const choice = new Choice({ care: (tag) => roster.needsCare(tag), alarms: (tag) => alarms.rank(tag) > 0 });
 const connection = new Connection();
 const evidence = new Evidence();
 const map = new LiveMap(byId("map"), byId("tools"), fleet, trails, roster, choice, evidence);
 const chips = new StateChips(byId("chips"), fleet, choice);
-const care = new CareChip(/** @type {HTMLButtonElement} */ (byId("care")), byId("care-count"), roster, choice);
+const care = new OnlyChip(byId("care"), "care", () => roster.careCount, choice);
+const troubled = new OnlyChip(byId("only-alarms"), "alarms", () => alarms.count, choice);
 const detail = new Detail(byId("detail"), fleet, roster, choice, evidence);
 const setup = new Setup(map, fleet, roster, choice, connection, panels);
 detail.changes = setup.changes;
@@ -77,6 +80,9 @@ detail.heightsInPast = (/** @type {string} */ tag) => past.heightsOf(tag);
 const zones = new Zones(map, connection, setup.changes, (tag) => fleet.row(tag) >= 0 && select(tag), panels);
 zones.follow(past);
 const finding = new Finding({ map, fleet, roster, choice, table, setup, plans, zones, measure, past, panels, select, pickAll, byId });
+const alarms = new Alarms(map, connection, setup.changes, choice, zones);
+table.alarmOf = (/** @type {string} */ tag) => alarms.rank(tag);
+notices.alarms = () => alarms.count;
 const alerts = new Alerts(byId("alerts"), byId("confirm"), connection, zones, setup.changes, panels);
 
 /** Show the details of a tag; null: leave them. @param {string | null} tag @param {() => void} [then] */
@@ -175,6 +181,8 @@ function updatePanels() {
   table.update();
   chips.update();
   care.update();
+  troubled.update();
+  alarms.update();
   detail.update();
   finding.update();
   past.update();
@@ -257,6 +265,7 @@ Object.defineProperty(window, "dropanchor", {
       return Array.from({ length: trail?.length ?? 0 }, (_, i) => /** @type {any} */ (trail).x[/** @type {any} */ (trail).at(i)]);
     },
     events: () => zones.log.current,
+    alarms: () => ({ pending: alarms.count, tags: Object.fromEntries(alarms.store.tags), sounds: alarms.sound.played }),
     destinations: () => alerts.store.states.map(({ destination, pending, dead }) => ({ id: destination.id, pending, dead })),
     zones: () => Object.fromEntries(zones.store.zones.map(({ id }) => [id, zones.store.inside.get(id) ?? 0])),
     draft: () => plans.editor.draft && { ...plans.editor.draft, corners: cornersOf(plans.editor.draft.placement, plans.editor.draft.image).map(([x, y]) => [map.view.screenX(x), map.view.screenY(y)]) },

@@ -4,6 +4,8 @@ import { addressValues, isAddressRead, listIn, listText, writeAddress } from "..
 import { STATES } from "../data/states.js";
 
 const WRITE_MS = 500;
+/** Of tags that the filter shows alone. */
+const KINDS = ["care", "alarms"];
 
 export class ViewAddress {
   #wroteAt = -Infinity;
@@ -26,7 +28,7 @@ export class ViewAddress {
     const hidden = (values.get("hide") ?? "").split(",");
     filter.value = values.get("text") ?? "";
     choice.filter({
-      text: filter.value, group: values.get("group") ?? "", onlyCare: values.has("care"),
+      text: filter.value, group: values.get("group") ?? "", only: KINDS.find((kind) => values.has(kind)) ?? "",
       hidden: STATES.flatMap(({ name }, number) => (hidden.includes(name) ? [number] : [])),
     });
     const tags = listIn(values.get("tags") ?? "");
@@ -47,11 +49,11 @@ export class ViewAddress {
   update() {
     if (performance.now() - this.#wroteAt < WRITE_MS || !isAddressRead()) return;
     this.#wroteAt = performance.now();
-    const { selected, several, follow, text, group, onlyCare, hiddenStates } = this.choice;
+    const { selected, several, follow, text, group, only, hiddenStates } = this.choice;
     const hidden = [...hiddenStates].sort().map((state) => STATES[state].name);
     writeAddress({
-      tag: selected, tags: several.length > 0 ? listText(several) : null, follow: follow ? "1" : null, text: text || null, group: group || null, care: onlyCare ? "1" : null,
-      hide: hidden.join() || null, ...this.#viewValues(),
+      tag: selected, tags: several.length > 0 ? listText(several) : null, follow: follow ? "1" : null, text: text || null, group: group || null,
+      hide: hidden.join() || null, ...Object.fromEntries(KINDS.map((kind) => [kind, only === kind ? "1" : null])), ...this.#viewValues(),
     });
   }
 

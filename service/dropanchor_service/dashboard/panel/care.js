@@ -1,31 +1,9 @@
-/** The number of tags that need care, as a chip that filters, and what the selected tag reports about itself. */
+/** What the selected tag reports about itself. */
 
-import { age, ago, count, fixed, percent } from "../data/format.js";
+import { age, ago, fixed, percent } from "../data/format.js";
 import { t } from "../i18n/language.js";
 
 /** @typedef {import("../data/roster.js").Health} Health */
-
-export class CareChip {
-  /** @param {HTMLButtonElement} button @param {HTMLElement} count @param {import("../data/roster.js").Roster} roster
-   * @param {import("../page/choice.js").Choice} choice */
-  constructor(button, count, roster, choice) {
-    this.button = button;
-    this.count = count;
-    this.roster = roster;
-    this.choice = choice;
-    button.addEventListener("click", () => (choice.onlyCare = !choice.onlyCare));
-    choice.addEventListener("change", () => this.update());
-    this.update();
-  }
-
-  update() {
-    const tags = this.roster.careCount;
-    this.button.hidden = tags === 0 && !this.choice.onlyCare;
-    this.button.setAttribute("aria-pressed", String(this.choice.onlyCare));
-    const text = count(tags);
-    if (this.count.textContent !== text) this.count.textContent = text;
-  }
-}
 
 /** Return what a tag reports about itself, as terms and values for people. @param {Health} health @returns {[string, string][]} */
 export function healthTexts(health) {

@@ -15,7 +15,7 @@ export class StateChips {
     this.fleet = fleet;
     this.choice = choice;
     this.#chips = STATES.map((state, number) => this.#build(state, number));
-    box.append(...BEST_FIRST.map((number) => this.#chips[number].button), this.#outdated.element);
+    box.append(...[...BEST_FIRST].reverse().map((number) => this.#chips[number].button), this.#outdated.element);
     choice.addEventListener("change", () => this.update());
     this.update();
   }

@@ -10,6 +10,8 @@ import { byId, write } from "../page/parts.js";
 
 export class Notices {
   #shared = new SharedNotice();
+  /** Return how many alarms want somebody. */
+  alarms = () => 0;
 
   /** @param {import("../data/connection.js").Connection} connection @param {import("../data/fleet.js").Fleet} fleet */
   constructor(connection, fleet) {
@@ -28,7 +30,8 @@ export class Notices {
     byId("status").dataset.status = isPast ? "past" : status;
     write(byId("status-text"), t(isPast ? "status.past" : `status.${status}`));
     byId("lost").hidden = status !== "lost" || isPast;
-    document.title = isPast ? t("page.past_title") : status === "lost" ? t("page.lost_title") : "Dropanchor";
+    const [title, alarms] = [isPast ? t("page.past_title") : status === "lost" ? t("page.lost_title") : "Dropanchor", this.alarms()];
+    document.title = alarms > 0 ? t("alarms.page_title", { n: alarms, title }) : title;
     write(byId("lost-text"), t("lost.text", { age: age((performance.now() - lostAt) / 1000) }));
     byId("starting").hidden = status !== "starting";
     write(byId("progress"), progress);

@@ -31,6 +31,8 @@ export class TagTable {
   #phone = matchMedia("(max-width: 560px)");
   /** Return whether a tag is on a floor that the map does not show. */
   isElsewhere = (/** @type {number} */ _row) => false;
+  /** Return 2 for a tag with an alarm, 1 with a warning, 0 with neither. */
+  alarmOf = (/** @type {string} */ _tag) => 0;
 
   /** @param {HTMLElement} box scrolls and holds the table @param {HTMLElement} count @param {Fleet} fleet
    * @param {import("../page/choice.js").Choice} choice @param {(tags: string[], pick: Pick) => void} chosen */
@@ -53,7 +55,7 @@ export class TagTable {
   /** Sort and paint the rows with the latest poses. */
   update() {
     const wanted = (/** @type {number} */ row) => this.choice.shows(this.fleet, row);
-    this.#rows = this.#order.rows(this.fleet, wanted, this.#sort, performance.now());
+    this.#rows = this.#order.rows(this.fleet, wanted, this.#sort, performance.now(), this.alarmOf);
     const all = tagCount(this.fleet.size);
     this.count.textContent = this.choice.isFiltered ? t("count.of", { shown: count(this.#rows.length), all }) : all;
     this.#paint();
@@ -152,7 +154,10 @@ export class TagTable {
     texts.forEach((value, i) => write(i === 0 ? nameOf(line) : line.cells[i], value));
     const isElsewhere = this.isElsewhere(row);
     const full = label === name ? name : `${label} (${name})`;
-    const words = isElsewhere ? t("table.elsewhere", { tag: full }) : full;
+    const alarm = this.alarmOf(name);
+    const placed = isElsewhere ? t("table.elsewhere", { tag: full }) : full;
+    const words = alarm === 0 ? placed : t(alarm === 2 ? "alarm.of_tag" : "alarm.warning_of_tag", { tag: placed });
+    set(line.element.dataset, "alarm", String(alarm));
     set(line.element.dataset, "elsewhere", String(isElsewhere));
     attribute(line.cells[0], "title", words);
     attribute(line.cells[0], "aria-label", words);

@@ -66,7 +66,7 @@ export class ZoneEditor extends EventTarget {
     this.#seen = NEW;
     this.drawing = true;
     this.zone = {
-      id: "", name: "", colour: COLOUR, shape, enter: true, exit: true, dwell_s: null, speed_mps: null, z_min_m: null, z_max_m: null,
+      id: "", name: "", colour: COLOUR, shape, enter: true, exit: true, dwell_s: null, speed_mps: null, enter_severity: "event", dwell_severity: "event", speed_severity: "event", z_min_m: null, z_max_m: null,
       delay_s: 1, tags: [], groups: [],
     };
     this.#say(null);

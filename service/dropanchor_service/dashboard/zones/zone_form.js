@@ -6,6 +6,7 @@ import { fieldOf, partOf, writeOrHide } from "../page/parts.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone */
 
+const SEVERITIES = /** @type {const} */ (["enter_severity", "dwell_severity", "speed_severity"]);
 const MEASURES = /** @type {const} */ (["speed_mps", "z_min_m", "z_max_m"]);
 
 export class ZoneForm {
@@ -57,7 +58,7 @@ export class ZoneForm {
     partOf(this.form, "delete").hidden = this.editor.isNew || !this.editor.store.isAdmin;
     for (const name of /** @type {const} */ (["enter", "exit"])) fieldOf(this.form, name).checked = zone[name];
     for (const name of /** @type {const} */ (["tags", "groups"])) this.#fill(name, zone[name].join(", "));
-    for (const name of /** @type {const} */ (["name", "colour", "dwell_s", "delay_s"])) this.#fill(name, String(zone[name] ?? ""));
+    for (const name of /** @type {const} */ (["name", "colour", "dwell_s", "delay_s", ...SEVERITIES])) this.#fill(name, String(zone[name] ?? ""));
     fieldOf(this.form, "radius_m").disabled = !isCircle;
     this.#measure("radius_m", isCircle ? shape.radius_m : null);
     for (const name of MEASURES) this.#measure(name, zone[name]);
@@ -84,6 +85,7 @@ export class ZoneForm {
     return {
       name: fieldOf(this.form, "name").value, colour: fieldOf(this.form, "colour").value,
       enter: fieldOf(this.form, "enter").checked, exit: fieldOf(this.form, "exit").checked,
+      ...Object.fromEntries(SEVERITIES.map((name) => [name, fieldOf(this.form, name).value])),
       dwell_s: number("dwell_s"), delay_s: number("delay_s") ?? 1,
       ...Object.fromEntries(MEASURES.map((name) => [name, readMeasure(fieldOf(this.form, name))])),
       tags: list("tags", /[\s,]+/), groups: list("groups", /\s*,\s*/),

@@ -4,6 +4,7 @@ import { Items } from "../data/items.js";
 import { Refreshed } from "../data/refreshed.js";
 
 /** @typedef {{type: "polygon", points: [number, number][]} | {type: "circle", x: number, y: number, radius_m: number}} Shape */
+/** @typedef {"event" | "warning" | "alarm"} Severity */
 /**
  * @typedef {object} Zone as in the interface
  * @property {string} id
@@ -14,6 +15,9 @@ import { Refreshed } from "../data/refreshed.js";
  * @property {boolean} exit
  * @property {number | null} dwell_s
  * @property {number | null} speed_mps
+ * @property {Severity} enter_severity
+ * @property {Severity} dwell_severity
+ * @property {Severity} speed_severity
  * @property {number | null} z_min_m
  * @property {number | null} z_max_m
  * @property {number} delay_s

@@ -5,6 +5,7 @@ export default {
   "keys.help": "Tasten zeigen",
   "keys.guide": "Anleitung (englisch): {guide}",
   "keys.filter": "Tags filtern",
+  "keys.alarm": "Die Alarme des ausgewählten Tags quittieren, oder zum ersten Alarm",
   "keys.escape": "Werkzeug oder Tag weglegen, Wandanzeige beenden",
   "keys.move": "Auf der Karte: verschieben",
   "keys.zoom": "Auf der Karte: Maßstab ändern",

@@ -1,5 +1,6 @@
 /** All messages in German. */
 
+import alarms from "./alarms.js";
 import alerts from "./alerts.js";
 import find from "./find.js";
 import plans from "./plans.js";
@@ -15,4 +16,4 @@ import service from "./service.js";
 import share from "./share.js";
 import trail from "./trail.js";
 
-export default { ...alerts, ...find, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...refusals, ...share, ...trail };
+export default { ...alarms, ...alerts, ...find, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...refusals, ...share, ...trail };

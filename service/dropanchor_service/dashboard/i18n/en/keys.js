@@ -5,6 +5,7 @@ export default {
   "keys.help": "Show the keys",
   "keys.guide": "Guide: {guide}",
   "keys.filter": "Filter tags",
+  "keys.alarm": "Acknowledge the alarms of the selected tag, or go to the first alarm",
   "keys.escape": "Put the tool or the tag away, leave the wall display",
   "keys.move": "On the map: move it",
   "keys.zoom": "On the map: zoom",
