@@ -1,10 +1,14 @@
 """What is wrong now is first on the page: found among hundreds of tags, acknowledged, muted, gone when it is over."""
 
+import time
+
 import pytest
 from playwright.sync_api import Browser, expect
 
+from dropanchor_schemas.events import EventType
 from dropanchor_schemas.zones import Severity
 from dropanchor_service.estimation.columns import State
+from dropanchor_service.events.drafts import Draft
 from service.dashboard.zone_place import ZonePlace, disc, served, zone_place
 from support.axe import violations
 from support.browser import WatchedPage, watched_page
@@ -12,6 +16,7 @@ from support.browser import WatchedPage, watched_page
 pytestmark = pytest.mark.browser
 
 TAGS = 300
+SECOND = 10**9
 
 
 def busy_place() -> ZonePlace:
@@ -87,6 +92,47 @@ def test_trouble_is_seen_among_hundreds_of_tags_acknowledged_muted_and_over(chro
         place.go("cart-55", -100.0, 0.0, speed=0.1, state=State.TRACKING)
         expect(alarms).to_be_hidden()
         assert page.page.evaluate("dropanchor.alarms().tags") == {}
+        assert page.errors == []
+
+
+def test_events_are_found_by_tag_kind_zone_and_time_are_not_cut_and_are_saved(chromium: Browser) -> None:
+    place = busy_place()
+    now_ns = time.time_ns()
+    drafts = []
+    for number in range(700):
+        t_ns = now_ns - (700 - number) * SECOND
+        data = {"t_ns": t_ns, "since_ns": t_ns, "zone": "lane" if number % 70 == 0 else "press"}
+        drafts.append(Draft((EventType.ZONE_ENTER, EventType.ZONE_EXIT)[number % 2], f"cart-{number % 5}", data))
+    place.parts.store.commit(drafts, {})
+    with served(place), watched_page(chromium, place.url) as page:
+        page.wait_for(f"dropanchor.tags().length === {TAGS} && dropanchor.events()")
+        page.page.locator("#events summary").click()
+        events, form = page.page.locator("#events"), page.page.get_by_role("form", name="Which events")
+        lines, older = events.locator("ol > li"), events.get_by_role("button", name="Show older ones")
+        expect(lines).to_have_count(100)
+        for count in (500, 700):
+            older.click()
+            expect(lines).to_have_count(count)
+        expect(older).to_be_hidden()
+        form.get_by_role("searchbox", name="Tag").fill("CART-3")
+        form.get_by_label("Type").select_option("A tag leaves a zone")
+        expect(lines).to_have_count(70)
+        expect(lines.first).to_contain_text("cart-3 left press")
+        place.parts.store.commit([Draft(EventType.ZONE_EXIT, tag, drafts[-1].data) for tag in ("cart-3", "cart-4")], {})
+        expect(lines).to_have_count(71)
+        with page.page.expect_download() as download:
+            form.get_by_role("button", name="CSV").click()
+        assert len(download.value.path().read_text().splitlines()) == 1 + 71
+        form.get_by_role("button", name="Show all").click()
+        form.get_by_label("Zone", exact=True).select_option("Slow lane")
+        expect(lines).to_have_count(10)
+        then = page.page.evaluate(
+            "(ms) => new Date(ms - new Date(ms).getTimezoneOffset() * 60000).toISOString().slice(0, 19)",
+            (now_ns - 350 * SECOND) // 10**6,
+        )
+        form.get_by_label("From").fill(then)
+        form.get_by_label("From").blur()
+        expect(lines).to_have_count(5)
         assert page.errors == []
 
 

@@ -2,13 +2,10 @@
 
 import { chosen, remember } from "../data/display.js";
 import { t } from "../i18n/language.js";
-import { clock, sentence } from "../zones/words.js";
+import { clock, KINDS, sentence } from "../zones/words.js";
 
 /** @typedef {import("../zones/words.js").ServiceEvent} ServiceEvent */
 
-const KINDS = [
-  "zone.enter", "zone.exit", "zone.dwell", "zone.speed", "tags.too_close", "tag.lost", "tag.ambiguous", "tag.battery_low",
-].map((name) => `dropanchor.${name}`);
 const COLLECT_MS = 1000;
 /** More events at once make one notification that counts them. */
 const MOST_AT_ONCE = 3;

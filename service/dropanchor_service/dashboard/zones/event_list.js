@@ -11,18 +11,20 @@ export class EventList {
   /** @type {Map<string, HTMLElement>} */
   #lines = new Map();
 
-  /** @param {HTMLDetailsElement} box @param {import("./event_log.js").EventLog | import("./past_events.js").PastEvents} log @param {(event: ServiceEvent) => void} pick */
+  /** @param {HTMLDetailsElement} box @param {import("./event_log.js").EventLog | import("./found_events.js").FoundEvents} log @param {(event: ServiceEvent) => void} pick */
   constructor(box, log, pick) {
     this.log = log;
     this.pick = pick;
     this.list = /** @type {HTMLElement} */ (box.querySelector("ol"));
     this.newest = /** @type {HTMLElement} */ (box.querySelector('[data-part="newest"]'));
     this.note = /** @type {HTMLElement} */ (box.querySelector('[data-part="note"]'));
+    this.more = /** @type {HTMLButtonElement} */ (box.querySelector('[data-part="more"]'));
     this.box = box;
   }
 
   update() {
-    const { events, current, note, none } = this.log;
+    const { events, current, note, none, hasMore } = this.log;
+    this.more.hidden = !hasMore;
     const newest = events[0];
     write(this.newest, !current ? t("events.outdated") : newest ? t("events.newest", { time: clock(newest), event: sentence(newest) }) : none);
     this.box.classList.toggle("outdated", !current);
@@ -38,9 +40,10 @@ export class EventList {
       line.remove();
       this.#lines.delete(sequence);
     }
-    for (const event of [...events].reverse()) {
-      if (!this.#lines.has(event.sequence)) this.list.prepend(this.#line(event));
-    }
+    events.forEach((event, i) => {
+      const line = this.#lines.get(event.sequence) ?? this.#line(event);
+      if (this.list.children[i] !== line) this.list.insertBefore(line, this.list.children[i] ?? null);
+    });
     const retracted = retractedBy(events);
     for (const event of events.filter(({ id }) => retracted.has(id))) this.#strike(event, retracted.get(event.id));
   }

@@ -46,6 +46,11 @@ export class EventLog extends EventTarget {
     this.#timer = setTimeout(() => this.start(), RETRY_MS);
   }
 
+  /** Whether there are older ones. */
+  get hasMore() {
+    return this.events.length === KEPT;
+  }
+
   /** What to know about the list. */
   get note() {
     if (!this.current) return t("events.missing");

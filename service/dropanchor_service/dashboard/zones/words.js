@@ -20,6 +20,11 @@ import { has, t, timeText } from "../i18n/language.js";
  *   acknowledged_by?: string | null, note?: string | null}} data
  */
 
+/** The kinds of events that zones and rules make. */
+export const KINDS = [
+  "zone.enter", "zone.exit", "zone.dwell", "zone.speed", "tags.too_close", "tag.lost", "tag.ambiguous", "tag.battery_low",
+].map((name) => `dropanchor.${name}`);
+
 /** Return what happened, such as `cart-3 entered Yard`. @param {ServiceEvent} event */
 export function sentence({ type, subject, data }) {
   const key = `event.${type}`;

@@ -8,7 +8,8 @@ import { EventLog } from "./event_log.js";
 import { Headcount } from "./headcount.js";
 import { Handles } from "./handles.js";
 import { withCorner } from "./shape_edit.js";
-import { PastEvents } from "./past_events.js";
+import { EventFilter } from "./event_filter.js";
+import { FoundEvents } from "./found_events.js";
 import { ZoneForm } from "./zone_form.js";
 import { ZoneList } from "./zone_list.js";
 import { ZoneStore } from "./zone_store.js";
@@ -31,6 +32,8 @@ export class Zones {
   selected = null;
   /** What the events belong to while the page shows the past. @type {import("../data/replay.js").Replay | null} */
   replay = null;
+  /** Events that somebody looks for, or those of the past. */
+  found = new FoundEvents();
   #timer = 0;
 
   /** @param {import("../map/map.js").LiveMap} map @param {import("../data/connection.js").Connection} connection
@@ -46,6 +49,11 @@ export class Zones {
     const box = byId("zone-list");
     this.handles = new Handles(byId("handles"), map, this.editor);
     this.events = new EventList(/** @type {HTMLDetailsElement} */ (byId("events")), this.log, (event) => this.pick(event));
+    this.filter = new EventFilter(/** @type {HTMLFormElement} */ (byId("event-filter")), map.fleet, this.store);
+    this.filter.addEventListener("change", () => this.#find());
+    this.found.addEventListener("change", () => this.events.update());
+    this.log.addEventListener("event", (event) => this.replay === null && this.found.take(/** @type {CustomEvent} */ (event).detail));
+    this.events.more.addEventListener("click", () => this.#findMore());
     const headcount = new Headcount(/** @type {HTMLDialogElement} */ (byId("headcount")), this.store, map.fleet, selectTag);
     this.list = new ZoneList(box, this.store, { select: (id) => this.select(id), edit: (id) => this.edit(id), count: (id) => headcount.open(id) });
     byId("count-all").addEventListener("click", () => headcount.open(null));
@@ -88,17 +96,28 @@ export class Zones {
 
   /** List the events of the past, which a click leads to, or those of the present. @param {import("../page/past.js").Past} past */
   follow(past) {
-    const events = new PastEvents();
-    past.replay.addEventListener("period", () => events.load(past.replay));
-    events.addEventListener("change", () => {
-      past.bar.mark(events.times);
-      this.events.update();
-    });
+    past.replay.addEventListener("period", () => this.#find());
+    this.found.addEventListener("change", () => this.replay && past.bar.mark(this.found.times));
     past.became = (isPast) => {
-      this.events.log = isPast ? events : this.log;
       this.replay = isPast ? past.replay : null;
-      this.events.update();
+      this.#find();
     };
+  }
+
+  /** List the events that are wanted; where nothing is said, the latest ones. */
+  #find() {
+    this.filter.period = this.replay && { from_ms: this.replay.from_ms, to_ms: this.replay.to_ms };
+    this.events.log = this.filter.isActive ? this.found : this.log;
+    if (this.filter.isActive) this.found.find(this.filter.wanted);
+    this.events.update();
+  }
+
+  /** List older events, too. */
+  async #findMore() {
+    if (this.events.log === this.log) await this.found.find(this.filter.wanted);
+    else await this.found.more();
+    this.events.log = this.found;
+    this.events.update();
   }
 
   /** Show the tag and the zone of an event. @param {import("./words.js").ServiceEvent} event */
