@@ -68,6 +68,26 @@ test("a state shows only its tags, more states show theirs, too, and without any
   assert.deepEqual(shown(tracking), [tracking]);
 });
 
+test("words of the filter name a zone, a floor, a group or a state, and all of them must hold", () => {
+  const zones = { a: ["Ramp 2"], b: ["Dock", "Ramp 2"], "lost-1": [] };
+  const choice = new Choice({}, (tag) => zones[tag]);
+  const names = Object.keys(zones);
+  const fleet = {
+    names, labels: ["A", "B", "C"], groups: ["forklifts", "", ""], value: { floor: ["Hall", null, "Hall"] },
+    state: [stateNumber("lost"), stateNumber("tracking"), stateNumber("tracking")],
+  };
+  const shown = (/** @type {string} */ text) => {
+    choice.text = text;
+    return names.filter((_, row) => choice.shows(/** @type {any} */ (fleet), row));
+  };
+  assert.deepEqual(shown("zone:RAMP"), ["a", "b"]);
+  assert.ok(choice.asksFor("zone"));
+  assert.deepEqual(shown("zone:ramp zone:dock"), ["b"]);
+  assert.deepEqual(shown("floor:hall group:fork"), ["a"]);
+  assert.deepEqual(shown("lost"), ["a", "lost-1"]); // by its state, and by its name
+  assert.deepEqual(shown("time:12"), []);
+});
+
 test("names with commas, signs and spaces stay whole in the list of the address", () => {
   const names = ["a,b", "100 %", "süd & co", "cart-1"];
   const values = new URLSearchParams(new URLSearchParams({ tags: listText(names) }).toString());

@@ -191,3 +191,22 @@ test("a relative tag is drawn where its own frame has it, and has no coordinates
   follow(fleet, 16, false);
   assert.deepEqual([fleet.style(0).name, fleet.number.x[0], fleet.drawnX[0], fleet.ownX[0]], ["tracking", -3, -3, NaN]);
 });
+
+test("by name, tags with alarms come first, then warnings, then lost and degraded ones", () => {
+  const fleet = new Fleet();
+  const state = ["tracking", "degraded", "lost", "tracking", "lost", "coasting"];
+  fleet.replace({ t_ns: 0, tags: ["a", "b", "c", "d", "e", "f"], state }, 0);
+  const alarmOf = (/** @type {string} */ tag) => ({ d: 2, e: 1 })[tag] ?? 0;
+  const rows = new Order().rows(fleet, () => true, { column: "tag", descending: false }, 0, alarmOf);
+  assert.deepEqual(rows.map((row) => fleet.names[row]), ["d", "e", "c", "b", "a", "f"]);
+});
+
+test("a tag stands since it was seen to stop, or at least since the page knows it", () => {
+  const fleet = new Fleet();
+  fleet.replace({ t_ns: 0, tags: ["a", "b"], speed_mps: [0, 1] }, 1000);
+  fleet.apply({ t_ns: 0, tags: ["a", "b"], speed_mps: [0.05, 0] }, 5000);
+  assert.deepEqual([fleet.stoppedFor(0, 9000), fleet.stoppedFor(1, 9000)], [8, 4]);
+  assert.deepEqual([fleet.sawStop(0), fleet.sawStop(1)], [false, true]);
+  fleet.apply({ t_ns: 0, tags: ["b"], speed_mps: [2] }, 9000);
+  assert.ok(Number.isNaN(fleet.stoppedFor(1, 9000)));
+});

@@ -45,6 +45,8 @@ def test_trouble_is_seen_among_hundreds_of_tags_acknowledged_muted_and_over(chro
         expect(alarms).to_be_hidden()
         page.page.locator("#options").click()
         page.page.get_by_label("Sound when an alarm begins").check()
+        page.page.get_by_role("group", name="Columns of the list").get_by_label("Zone").check()
+        page.page.get_by_role("group", name="Columns of the list").get_by_label("Speed").uncheck()
         page.page.keyboard.press("Escape")
         page.wait_for("dropanchor.alarms().sounds === 1")  # how it sounds
 
@@ -69,6 +71,12 @@ def test_trouble_is_seen_among_hundreds_of_tags_acknowledged_muted_and_over(chro
         chip.click()
         expect(page.page.locator("#count")).to_have_text("2 of 300 tags")
         chip.click()
+        page.page.locator("#filter").fill("zone:press")
+        expect(page.page.locator("#count")).to_have_text("1 of 300 tags")
+        expect(page.page.locator("#table tbody tr:not([hidden]) .c-zone")).to_have_text("Press 4")
+        expect(page.page.get_by_role("columnheader", name="v m/s")).to_be_hidden()
+        page.page.locator("#filter").fill("")
+        page.page.locator("#filter").blur()
         page.page.keyboard.press("a")
         expect(alarms.get_by_role("button", name="Acknowledge: cart-111 entered Press 4")).to_be_focused()
         alarms.get_by_label("Note on: cart-111 entered Press 4").fill("the driver knows")

@@ -8,6 +8,9 @@ const NUMBERS = /** @type {const} */ ([
   "semi_major_m", "semi_minor_m", "angle_rad",
 ]);
 
+/** A tag that is slower stands. */
+const STANDS_MPS = 0.1;
+
 /** Columns of values that are stored as received; unknown is null. */
 const VALUES = /** @type {const} */ (["reason", "hint", "hint_phrase", "frame", "anchor", "hypotheses", "z_source", "floor"]);
 
@@ -56,6 +59,10 @@ export class Fleet {
   online = new Uint8Array(0);
   /** Time at which the pose was valid, in ms on the clock of the caller; NaN before the first pose. */
   poseTime = new Float64Array(0);
+  /** Since when the tag has stood, on the clock of the caller; NaN: it does not. */
+  #stoppedAt = new Float64Array(0);
+  /** Whether it has been seen in motion. */
+  #hasMoved = new Uint8Array(0);
   /** Where the dot is drawn: follows x, y smoothly (see motion.js). */
   drawnX = new Float32Array(0);
   drawnY = new Float32Array(0);
@@ -75,6 +82,16 @@ export class Fleet {
   /** Seconds since the pose was valid; NaN before the first pose. @param {number} row @param {number} now_ms */
   age(row, now_ms) {
     return (now_ms - this.poseTime[row]) / 1000;
+  }
+
+  /** Seconds since when the tag has stood; NaN: it moves, or nobody knows. @param {number} row @param {number} now_ms */
+  stoppedFor(row, now_ms) {
+    return this.current && !this.past ? (now_ms - this.#stoppedAt[row]) / 1000 : NaN;
+  }
+
+  /** Whether the tag was seen in motion before it stopped. @param {number} row */
+  sawStop(row) {
+    return this.#hasMoved[row] === 1;
   }
 
   /** Return the label, meaning and shape of a tag's state. @param {number} row @returns {import("./states.js").StateStyle} */
@@ -132,7 +149,16 @@ export class Fleet {
     if (frame.relative_pose) writeNumbers(this.ownX, rows, frame.relative_pose.map((/** @type {any} */ own) => own?.x));
     if (frame.relative_pose) writeNumbers(this.ownY, rows, frame.relative_pose.map((/** @type {any} */ own) => own?.y));
     if (frame.online) rows.forEach((row, i) => (this.online[row] = frame.online[i] ? 1 : 0));
+    if (frame.speed_mps) for (const row of rows) this.#noteMotion(row, now_ms);
     if (frame.age_s) rows.forEach((row, i) => (this.poseTime[row] = now_ms - (frame.age_s[i] ?? NaN) * 1000));
+  }
+
+  /** @param {number} row @param {number} now_ms */
+  #noteMotion(row, now_ms) {
+    const stands = this.number.speed_mps[row] < STANDS_MPS;
+    if (!stands) this.#stoppedAt[row] = NaN;
+    else if (Number.isNaN(this.#stoppedAt[row])) this.#stoppedAt[row] = now_ms;
+    if (this.number.speed_mps[row] >= STANDS_MPS) this.#hasMoved[row] = 1;
   }
 
   /** Apply a frame that names every tag. Remove all other tags. @param {Frame} frame @param {number} now_ms */
@@ -171,8 +197,8 @@ export class Fleet {
     this.membership++;
     for (const column of Object.values(this.number)) column[row] = NaN;
     for (const column of Object.values(this.value)) column[row] = null;
-    this.state[row] = this.online[row] = 0;
-    this.poseTime[row] = this.drawnX[row] = this.drawnY[row] = this.ownX[row] = this.ownY[row] = NaN;
+    this.state[row] = this.online[row] = this.#hasMoved[row] = 0;
+    this.poseTime[row] = this.#stoppedAt[row] = this.drawnX[row] = this.drawnY[row] = this.ownX[row] = this.ownY[row] = NaN;
     return row;
   }
 
@@ -180,6 +206,8 @@ export class Fleet {
     const capacity = Math.max(64, 2 * this.state.length);
     this.state = grown(this.state, new Uint8Array(capacity));
     this.online = grown(this.online, new Uint8Array(capacity));
+    this.#stoppedAt = grown(this.#stoppedAt, new Float64Array(capacity));
+    this.#hasMoved = grown(this.#hasMoved, new Uint8Array(capacity));
     this.poseTime = grown(this.poseTime, new Float64Array(capacity));
     this.drawnX = grown(this.drawnX, new Float32Array(capacity));
     this.drawnY = grown(this.drawnY, new Float32Array(capacity));

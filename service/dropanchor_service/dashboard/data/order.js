@@ -24,12 +24,13 @@ export class Order {
    * By name, tags in trouble come first: with alarms, then lost, then degraded ones.
    * @param {Fleet} fleet @param {(row: number) => boolean} wanted @param {Sort} sort @param {number} now_ms
    * @param {(tag: string) => number} [alarmOf] 2: alarm, 1: warning, 0: neither
+   * @param {(column: string, now_ms: number) => ((row: number) => number) | null} [valueOfMore] of columns that are not of the fleet
    */
-  rows(fleet, wanted, sort, now_ms, alarmOf = () => 0) {
+  rows(fleet, wanted, sort, now_ms, alarmOf = () => 0, valueOfMore = () => null) {
     this.#sortNames(fleet);
     const rows = this.#byName.filter(wanted);
     const sign = sort.descending ? -1 : 1;
-    const value = valueOf(fleet, sort.column, now_ms);
+    const value = valueOf(fleet, sort.column, now_ms) ?? valueOfMore(sort.column, now_ms);
     if (!value) return troubledFirst(sort.descending ? rows.reverse() : rows, (row) => 3 * alarmOf(fleet.names[row]) + (TROUBLE.get(fleet.state[row]) ?? 0));
     const values = Float64Array.from({ length: fleet.size }, (_, row) => value(row));
     return rows.sort((a, b) => compare(values[a], values[b], sign) || this.#place[a] - this.#place[b]);

@@ -11,15 +11,19 @@ export class Choice extends EventTarget {
   #gathering = false;
   #follow = false;
   #text = "";
+  /** The words of the text, such as `zone:ramp`. @type {{key: string, word: string}[]} */
+  #words = [];
   #only = "";
   #group = "";
   /** @type {Set<number>} */
   hiddenStates = new Set();
 
-  /** @param {Record<string, (tag: string) => boolean>} kinds of tags that can be shown alone, by their names */
-  constructor(kinds = {}) {
+  /** @param {Record<string, (tag: string) => boolean>} kinds of tags that can be shown alone, by their names
+   * @param {(tag: string) => readonly string[]} zonesOf the names of the zones in which a tag is */
+  constructor(kinds = {}, zonesOf = () => []) {
     super();
     this.kinds = kinds;
+    this.zonesOf = zonesOf;
   }
 
   /** The selected tag; null: none, or several. */
@@ -83,8 +87,22 @@ export class Choice extends EventTarget {
   }
 
   set text(text) {
-    this.#text = text.trim().toLowerCase();
+    this.#read(text);
     this.#changed();
+  }
+
+  /** @param {string} text */
+  #read(text) {
+    this.#text = text.trim().toLowerCase();
+    this.#words = this.#text.split(/\s+/).filter(Boolean).map((word) => {
+      const [, key = "", rest = word] = /^(zone|floor|group):(.*)$/.exec(word) ?? [];
+      return { key, word: rest };
+    });
+  }
+
+  /** Return whether a word asks for something, such as a zone. @param {string} key */
+  asksFor(key) {
+    return this.#words.some((one) => one.key === key);
   }
 
   /** Show only the tags in a state; these, too, where only some are shown; without them, if they were. @param {number} state */
@@ -121,7 +139,7 @@ export class Choice extends EventTarget {
 
   /** Set the whole filter. @param {{text: string, group: string, only: string, hidden: number[]}} filter hidden: states */
   filter({ text, group, only, hidden }) {
-    this.#text = text.trim().toLowerCase();
+    this.#read(text);
     this.#group = group;
     this.#only = only;
     this.hiddenStates = new Set(hidden);
@@ -137,7 +155,16 @@ export class Choice extends EventTarget {
     if (this.hiddenStates.size > 0 && this.hiddenStates.has(fleet.state[row])) return false;
     if (this.#only !== "" && !this.kinds[this.#only]?.(fleet.names[row])) return false;
     if (this.#group !== "" && fleet.groups[row] !== this.#group) return false;
-    return this.#text === "" || `${fleet.labels[row]}\n${fleet.names[row]}`.toLowerCase().includes(this.#text);
+    return this.#words.every((word) => this.#matches(fleet, row, word));
+  }
+
+  /** @param {import("../data/fleet.js").Fleet} fleet @param {number} row @param {{key: string, word: string}} word */
+  #matches(fleet, row, { key, word }) {
+    if (key === "zone") return this.zonesOf(fleet.names[row]).some((zone) => zone.toLowerCase().includes(word));
+    if (key === "floor") return (fleet.value.floor[row] ?? "").toLowerCase().includes(word);
+    if (key === "group") return fleet.groups[row].toLowerCase().includes(word);
+    const { name, label } = STATES[fleet.state[row]];
+    return name === word || label.toLowerCase() === word || `${fleet.labels[row]}\n${fleet.names[row]}`.toLowerCase().includes(word);
   }
 
   #changed() {

@@ -1,6 +1,7 @@
 /** The table of all tags. Only visible rows exist in the document, so that ten thousand tags stay fast. */
 
-import { UNKNOWN, age, coordinate, count, half, speedNumber, tagCount } from "../data/format.js";
+import { COLUMNS } from "./columns.js";
+import { count, tagCount } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { Order } from "../data/order.js";
 import { NameColumn } from "../data/names.js";
@@ -16,7 +17,6 @@ const ROW_PX = 32;
 const TOUCH_ROW_PX = 44;
 const SPARE = 4;
 const NAME_LINES = 2;
-const COLUMNS = ["tag", "state", "x", "y", "accuracy", "speed", "age", "online"];
 
 export class TagTable {
   /** @type {import("../data/order.js").Sort} */
@@ -35,12 +35,14 @@ export class TagTable {
   alarmOf = (/** @type {string} */ _tag) => 0;
 
   /** @param {HTMLElement} box scrolls and holds the table @param {HTMLElement} count @param {Fleet} fleet
-   * @param {import("../page/choice.js").Choice} choice @param {(tags: string[], pick: Pick) => void} chosen */
-  constructor(box, count, fleet, choice, chosen) {
+   * @param {import("../page/choice.js").Choice} choice @param {import("./columns.js").Columns} columns
+   * @param {(tags: string[], pick: Pick) => void} chosen */
+  constructor(box, count, fleet, choice, columns, chosen) {
     this.box = box;
     this.count = count;
     this.fleet = fleet;
     this.choice = choice;
+    this.columns = columns;
     this.chosen = chosen;
     this.body = /** @type {HTMLTableSectionElement} */ (box.querySelector("tbody"));
     this.body.addEventListener("click", (event) => this.#onClick(event));
@@ -50,12 +52,22 @@ export class TagTable {
     for (const button of box.querySelectorAll("button[data-column]")) this.#listenToHead(button);
     new ResizeObserver(() => this.#paint()).observe(box);
     choice.addEventListener("change", () => this.update());
+    columns.addEventListener("change", () => this.#showColumns());
+    this.#showColumns();
+  }
+
+  #showColumns() {
+    for (const name of COLUMNS) {
+      for (const cell of /** @type {NodeListOf<HTMLElement>} */ (this.box.querySelectorAll(`.c-${name}`))) cell.hidden = !this.columns.isShown(name);
+    }
+    this.box.setAttribute("aria-colcount", String(1 + COLUMNS.filter((name) => this.columns.isShown(name)).length));
+    this.update();
   }
 
   /** Sort and paint the rows with the latest poses. */
   update() {
     const wanted = (/** @type {number} */ row) => this.choice.shows(this.fleet, row);
-    this.#rows = this.#order.rows(this.fleet, wanted, this.#sort, performance.now(), this.alarmOf);
+    this.#rows = this.#order.rows(this.fleet, wanted, this.#sort, performance.now(), this.alarmOf, (column, now_ms) => this.columns.value(column, now_ms));
     const all = tagCount(this.fleet.size);
     this.count.textContent = this.choice.isFiltered ? t("count.of", { shown: count(this.#rows.length), all }) : all;
     this.#paint();
@@ -119,8 +131,9 @@ export class TagTable {
     const element = document.createElement("tr");
     element.id = `row-${this.#lines.length}`;
     element.setAttribute("role", "row");
-    const cells = COLUMNS.map((column) => {
+    const cells = ["tag", ...COLUMNS].map((column) => {
       const cell = element.insertCell();
+      cell.hidden = column !== "tag" && !this.columns.isShown(column);
       cell.className = `c-${column}`;
       cell.setAttribute("role", "gridcell");
       return cell;
@@ -136,9 +149,7 @@ export class TagTable {
   /** @param {Line} line @param {number} row @param {number} place @param {number} now_ms */
   #fill(line, row, place, now_ms) {
     const { fleet } = this;
-    const { x, y, semi_major_m, speed_mps } = fleet.number;
     const state = fleet.style(row);
-    const seconds = fleet.age(row, now_ms);
     const name = fleet.names[row];
     const label = fleet.labels[row];
     set(line.element.dataset, "tag", name);
@@ -147,11 +158,8 @@ export class TagTable {
     attribute(line.element, "aria-rowindex", String(place + 2));
     attribute(line.element, "aria-selected", String(this.choice.tags.includes(name)));
     attribute(line.use, "href", `#s-${state.name}`);
-    const texts = [
-      this.#names.of(label), state.label, coordinate(x[row]), coordinate(y[row]), half(semi_major_m[row]), speedNumber(speed_mps[row], 2),
-      age(seconds), !fleet.current ? UNKNOWN : t(fleet.online[row] ? "figure.online" : "figure.offline"),
-    ];
-    texts.forEach((value, i) => write(i === 0 ? nameOf(line) : line.cells[i], value));
+    write(nameOf(line), this.#names.of(label));
+    COLUMNS.forEach((column, i) => this.columns.isShown(column) && write(line.cells[i + 1], this.columns.text(column, row, now_ms)));
     const isElsewhere = this.isElsewhere(row);
     const full = label === name ? name : `${label} (${name})`;
     const alarm = this.alarmOf(name);
@@ -162,7 +170,7 @@ export class TagTable {
     attribute(line.cells[0], "title", words);
     attribute(line.cells[0], "aria-label", words);
     line.cells[0].style.setProperty("--mark", fleet.colours[row] || "transparent");
-    line.cells[7].classList.toggle("yes", fleet.current && fleet.online[row] === 1);
+    /** @type {HTMLTableCellElement} */ (line.cells.at(-1)).classList.toggle("yes", fleet.current && fleet.online[row] === 1);
   }
 
   #pointAtActive() {

@@ -33,13 +33,33 @@ export class ZoneStore extends Refreshed {
   /** Tags inside, by zone. @type {Map<string, number>} */
   inside = new Map();
 
+  /** Return whether anybody wants to know which tags are inside. */
+  wantsNames = () => false;
+  /** The names and ids of the zones of each tag. @type {Map<string, string[]>} */
+  #zonesOf = new Map();
+
   get paths() {
-    return ["zones", "zone-occupancy"];
+    return ["zones", this.wantsNames() ? "zone-occupancy?names=true" : "zone-occupancy"];
+  }
+
+  /** Return the names of the zones in which a tag is, once somebody wanted to know. @param {string} tag @returns {readonly string[]} */
+  zonesOf(tag) {
+    return this.#zonesOf.get(tag) ?? [];
   }
 
   /** @param {any[]} answers */
   take([zones, occupancy]) {
     if (zones) this.zones = zones.zones;
+    if (occupancy) this.#take(occupancy.zones);
     if (occupancy) this.inside = new Map(occupancy.zones.map((/** @type {{zone: string, tags: number}} */ { zone, tags }) => [zone, tags]));
+  }
+
+  /** @param {{zone: string, inside: {tag: string}[] | null}[]} occupied */
+  #take(occupied) {
+    const names = new Map(this.zones.map(({ id, name }) => [id, name || id]));
+    this.#zonesOf = new Map();
+    for (const { zone, inside } of occupied) {
+      for (const { tag } of inside ?? []) this.#zonesOf.set(tag, [...this.zonesOf(tag), names.get(zone) ?? zone]);
+    }
   }
 }
