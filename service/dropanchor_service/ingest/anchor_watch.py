@@ -6,7 +6,7 @@ that in another way; several tags, of which some come nearer and others go farth
 
 import logging
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -51,8 +51,13 @@ class AnchorWatch:
         if self._doubted:
             self._mark(batch.poses)
 
-    def told(self, anchors: Iterable[int]) -> None:
-        """Trust these anchors again: somebody has said where they are."""
+    def told(self, anchors: Sequence[int]) -> None:
+        """Trust these anchors again: somebody has said where they are.
+
+        Their ranges have to agree with the tracks anew before a step counts: what moved tracks with them is none.
+        """
+        for name in ("clean_s", "before_s"):
+            self._heard[name][np.isin(self._heard["anchor"], anchors)] = 0.0
         for anchor in anchors:
             self._steps.pop(anchor, None)
             if (doubt := self._doubted.pop(anchor, None)) is not None:

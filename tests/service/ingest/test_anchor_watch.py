@@ -91,6 +91,18 @@ def test_tags_of_other_anchors_are_believed_and_all_again_once_somebody_says_whe
     assert doubts.of(0) is None
 
 
+def test_tracks_that_contradict_the_ranges_since_somebody_said_where_the_anchor_is_doubt_nothing() -> None:
+    later = [innovations(row, (way, 1.0)) for row, way in ((2, -2.0), (3, 2.0))]
+    told_ns = MOVED_NS + SECOND // 2
+    at_once = [innovations(0, (-2.0, 0.0)), innovations(1, (2.0, 0.0))]
+    watch, doubts, _ = watched([part[part["t_ns"] < told_ns] for part in (*at_once, *later)], 4)
+    assert doubts.of(0) is not None
+    watch.told([0])
+    watch.look(PoseBatch(innovations=np.concatenate([part[part["t_ns"] >= told_ns] for part in later])))
+    watch.look(PoseBatch(poses=poses_at_end(range(4))))
+    assert doubts.of(0) is None
+
+
 def test_a_tag_that_hears_another_anchor_too_says_nothing_alone() -> None:
     _, doubts, batch = watched([innovations(0, (-2.0, 0.0)), innovations(0, (0.0, 0.0), anchor=1)], 1)
     assert doubts.of(0) is None
