@@ -58,8 +58,10 @@ def configuration(mode: str, endpoints: list[str], extra: dict[str, Any] | None 
     retry = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
     connect = {"endpoints": endpoints, "timeout_ms": round(1000 * PATIENCE_S), "exit_on_failure": True, "retry": retry}
     role = {"listen": {"endpoints": endpoints}} if mode == "router" else {"connect": connect}
+    drop = {"wait_before_drop": round(1e6 * PATIENCE_S), "max_wait_before_drop_fragments": round(1e6 * PATIENCE_S)}
+    patient = {"link": {"tx": {"queue": {"congestion_control": {"drop": drop}}}}}  # a busy machine drops no put
     quiet = {"scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}}}
-    transport = {"shared_memory": {"enabled": False}, **(extra or {})}
+    transport = {"shared_memory": {"enabled": False}, **(patient if mode == "client" else {}), **(extra or {})}
     unstamped = {"timestamping": {"enabled": False}}
     return json.dumps({"mode": mode, **role, **quiet, **unstamped, "transport": transport})
 
