@@ -18,6 +18,7 @@ from typing import Any
 import httpx
 
 from dropanchor_schemas.wire import Frame, HeadingSample, ImuSample, RangeSample
+from support.forks import Forked, start_forked
 from support.kernel_cache import compile_once
 from support.patience import PATIENCE_S
 from support.zenoh_router import free_endpoint, wait_until
@@ -34,7 +35,7 @@ class Running:
     ca: certificate of the authority that signed its own.
     """
 
-    process: subprocess.Popen[str]
+    process: subprocess.Popen[str] | Forked
     zenoh: str
     log: list[str]
     began_s: float
@@ -105,10 +106,7 @@ def running_service(
     has_zenoh = subcommand != "api" and not any("--zenoh" in argument for argument in arguments)
     listening = ("--zenoh-listen", zenoh) if has_zenoh else ()
     began_s = time.monotonic()
-    words = command(subcommand, "--port", "0", *listening, *arguments)
-    if clock_ahead_s:
-        words = with_wrong_clock(words, clock_ahead_s)
-    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment())
+    process = _started([subcommand, "--port", "0", *listening, *arguments], clock_ahead_s)
     running = Running(process, zenoh, [], began_s, ca=ca)
     reader = Thread(target=_read, args=(running,), daemon=True)
     reader.start()
@@ -125,6 +123,13 @@ def running_service(
         reader.join(5.0)
         if process.stderr is not None:
             process.stderr.close()
+
+
+def _started(words: list[str], clock_ahead_s: float) -> subprocess.Popen[str] | Forked:
+    if not clock_ahead_s:
+        return start_forked(words, environment())
+    ahead = with_wrong_clock(command(*words), clock_ahead_s)
+    return subprocess.Popen(ahead, stderr=subprocess.PIPE, text=True, env=environment())
 
 
 @contextmanager

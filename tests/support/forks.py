@@ -1,0 +1,124 @@
+"""Start `dropanchor` as a fork of a process that has imported it: the imports are four fifths of what a start costs.
+
+Each program is a process of its own. Only the imports are shared, and nothing of it runs before the fork.
+"""
+
+import functools
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+_PROGRAM = """
+import gc, json, os, runpy, socket, sys
+import dropanchor_service.cli, dropanchor_service.commands.api, dropanchor_service.commands.serve
+
+asked = socket.socket(fileno=int(sys.argv[1]))
+gc.collect()
+gc.freeze()
+while True:
+    text, files, _, _ = socket.recv_fds(asked, 1_000_000, 2)
+    if not text:
+        break
+    request = json.loads(text)
+    if "ended" in request:
+        answer = os.waitstatus_to_exitcode(os.waitpid(request["ended"], 0)[1])
+    else:
+        answer = os.fork()
+    if not answer and "words" in request:
+        asked.close()
+        for number, file in enumerate(files, 1):
+            os.dup2(file, number)
+            os.close(file)
+        os.chdir(request["folder"])
+        os.environ.clear()
+        os.environ.update(request["environment"])
+        sys.argv[1:] = request["words"]
+        runpy.run_module("dropanchor_service", run_name="__main__", alter_sys=True)
+    for file in files:
+        os.close(file)
+    asked.send(b"%d" % answer)
+"""
+_READ_AT_IMPORT = ("LD_", "MALLOC_", "NUMBA_", "OMP_", "OPENBLAS_", "PYTHON", "ZENOH_")
+
+
+class Forked:
+    """A running program. It has of `subprocess.Popen` what tests need."""
+
+    def __init__(self, server: "Server", pid: int, stderr: int) -> None:
+        self._server, self._lock = server, threading.Lock()
+        self._ends = os.pidfd_open(pid)
+        self.pid, self.stderr = pid, os.fdopen(stderr)
+        self.returncode: int | None = None
+
+    def poll(self) -> int | None:
+        """Return the exit code, None while it runs."""
+        with self._lock:
+            if self.returncode is None and select.select([self._ends], [], [], 0.0)[0]:
+                self.returncode = self._server.ask({"ended": self.pid})
+                os.close(self._ends)
+            return self.returncode
+
+    def wait(self, timeout: float | None = None) -> int:
+        if self.poll() is None:
+            select.select([self._ends], [], [], timeout)
+        if (code := self.poll()) is None:
+            raise subprocess.TimeoutExpired(f"process {self.pid}", timeout or 0.0)
+        return code
+
+    def send_signal(self, how: signal.Signals) -> None:
+        if self.poll() is None:
+            os.kill(self.pid, how)
+
+    def kill(self) -> None:
+        self.send_signal(signal.SIGKILL)
+
+
+class Server:
+    """The process that forks. environment: of what it forks, so far as it is read by imports."""
+
+    def __init__(self, environment: dict[str, str]) -> None:
+        self.read = read_at_import(environment)
+        self._lock = threading.Lock()
+        self._socket, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with its:
+            program = [sys.executable, "-c", _PROGRAM, str(its.fileno())]
+            self._process = subprocess.Popen(program, pass_fds=[its.fileno()], env=environment)
+
+    def start(self, words: Sequence[str], environment: dict[str, str]) -> Forked:
+        """Run `dropanchor` with these words. Its stdout is that of this process."""
+        reading, writing = os.pipe()
+        request = {"words": list(words), "folder": os.getcwd(), "environment": environment}
+        pid = self.ask(request, 1, writing)
+        os.close(writing)
+        return Forked(self, pid, reading)
+
+    def ask(self, request: dict[str, Any], *files: int) -> int:
+        with self._lock:
+            socket.send_fds(self._socket, [json.dumps(request).encode()], files)
+            return int(self._socket.recv(64))
+
+
+def read_at_import(environment: dict[str, str]) -> dict[str, str]:
+    return {name: value for name, value in environment.items() if name.startswith(_READ_AT_IMPORT)}
+
+
+@functools.cache
+def _servers() -> list[Server]:
+    return []
+
+
+def start_forked(words: Sequence[str], environment: dict[str, str]) -> Forked:
+    """Run `dropanchor` with these words in a process of its own."""
+    read = read_at_import(environment)
+    server = next((one for one in _servers() if one.read == read), None)
+    if server is None:
+        server = Server(environment)
+        _servers().append(server)
+    return server.start(words, environment)
