@@ -103,7 +103,7 @@ def test_the_service_raises_its_limit_of_open_files_to_the_hard_limit() -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(1024, hard), hard))
     try:
-        with running_service() as service:
+        with running_service(forked=False) as service:
             assert resource.prlimit(service.process.pid, resource.RLIMIT_NOFILE) == (hard, hard)
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))

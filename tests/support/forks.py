@@ -1,6 +1,7 @@
 """Start `dropanchor` as a fork of a process that has imported it: the imports are four fifths of what a start costs.
 
-Each program is a process of its own. Only the imports are shared, and nothing of it runs before the fork.
+Each program is a process of its own. Only the imports are shared, and nothing of it runs before the fork. It does not
+inherit the limits of this process.
 """
 
 import functools
@@ -14,6 +15,8 @@ import sys
 import threading
 from collections.abc import Sequence
 from typing import Any
+
+from support.commands import environment
 
 _PROGRAM = """
 import gc, json, os, runpy, socket, sys
@@ -110,15 +113,15 @@ def read_at_import(environment: dict[str, str]) -> dict[str, str]:
 
 
 @functools.cache
-def _servers() -> list[Server]:
-    return []
+def _server() -> Server:
+    return Server(environment())
+
+
+def can_be_forked() -> bool:
+    """Return whether what imports read of the environment is the same as for the other programs."""
+    return read_at_import(environment()) == _server().read
 
 
 def start_forked(words: Sequence[str], environment: dict[str, str]) -> Forked:
     """Run `dropanchor` with these words in a process of its own."""
-    read = read_at_import(environment)
-    server = next((one for one in _servers() if one.read == read), None)
-    if server is None:
-        server = Server(environment)
-        _servers().append(server)
-    return server.start(words, environment)
+    return _server().start(words, environment)

@@ -18,7 +18,7 @@ from typing import Any
 import httpx
 
 from dropanchor_schemas.wire import Frame, HeadingSample, ImuSample, RangeSample
-from support.forks import Forked, start_forked
+from support.forks import Forked, can_be_forked, start_forked
 from support.kernel_cache import compile_once
 from support.patience import PATIENCE_S
 from support.zenoh_router import free_endpoint, wait_until
@@ -96,17 +96,20 @@ def running_service(
     subcommand: str = "serve",
     ca: Path | None = None,
     clock_ahead_s: float = 0.0,
+    forked: bool = True,
 ) -> Iterator[Running]:
     """Run `dropanchor serve` on free ports until the block ends. ready: wait until it reports that it is ready.
 
-    clock_ahead_s: how far the clock of its host is ahead.
+    clock_ahead_s: how far the clock of its host is ahead. forked: see `support.forks`.
     """
     compile_once()
     zenoh = endpoint or free_endpoint()
     has_zenoh = subcommand != "api" and not any("--zenoh" in argument for argument in arguments)
     listening = ("--zenoh-listen", zenoh) if has_zenoh else ()
     began_s = time.monotonic()
-    process = _started([subcommand, "--port", "0", *listening, *arguments], clock_ahead_s)
+    words = [subcommand, "--port", "0", *listening, *arguments]
+    forked = forked and not clock_ahead_s and can_be_forked()
+    process = start_forked(words, environment()) if forked else _started(words, clock_ahead_s)
     running = Running(process, zenoh, [], began_s, ca=ca)
     reader = Thread(target=_read, args=(running,), daemon=True)
     reader.start()
@@ -125,11 +128,9 @@ def running_service(
             process.stderr.close()
 
 
-def _started(words: list[str], clock_ahead_s: float) -> subprocess.Popen[str] | Forked:
-    if not clock_ahead_s:
-        return start_forked(words, environment())
-    ahead = with_wrong_clock(command(*words), clock_ahead_s)
-    return subprocess.Popen(ahead, stderr=subprocess.PIPE, text=True, env=environment())
+def _started(words: list[str], clock_ahead_s: float) -> subprocess.Popen[str]:
+    program = with_wrong_clock(command(*words), clock_ahead_s) if clock_ahead_s else command(*words)
+    return subprocess.Popen(program, stderr=subprocess.PIPE, text=True, env=environment())
 
 
 @contextmanager
