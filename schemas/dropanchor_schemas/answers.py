@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from dropanchor_schemas.models import Frozen
+from dropanchor_schemas.models import Exact, Frozen
 from dropanchor_schemas.pose import Phrase, TrackingState
 from dropanchor_schemas.site import Anchor, Georeference, RemoteSettings, TagSettings
 from dropanchor_schemas.tag_health import Care, TagHealth
@@ -208,6 +208,26 @@ class Connect(Frozen):
         description="A command that starts a simulated tag. A client on the service's own machine gets the command "
         "with the full path of the program."
     )
+    pages: list[str] = Field(
+        default=[],
+        description="Addresses of the page for other devices; empty: the service listens on its own machine alone.",
+    )
+    may_simulate: bool = Field(
+        default=False,
+        description="Whether the service can start simulated tags itself: if tags need no credentials.",
+    )
+
+
+class QrCodeRequest(Exact):
+    """What a QR code is to say."""
+
+    text: str = Field(min_length=1, max_length=1000, description="Such as a link that a phone opens.")
+
+
+class SimulatedTags(Exact):
+    """Simulated tags that the service runs."""
+
+    tags: int = Field(ge=1, le=20, description="How many, `sim-1` to `sim-N`.")
 
 
 class Health(Frozen):

@@ -194,7 +194,7 @@ class Service:
 
     def __exit__(self, *_: object) -> None:
         self._stopping.set()
-        self._serving.folders.stop_reading()
+        self._serving.stop()
         self._opened.close()
         _log.info("stopped")
 
@@ -297,4 +297,4 @@ class Service:
             return not (found := self.problems()), found
 
         takes = (self._from_http.samples, self._from_http.health)
-        return self._serving.app(self.answers, ready, self.impairments, self._stopping, *takes)
+        return self._serving.app(self.answers, ready, self.impairments, self._stopping, *takes, url=self.url)

@@ -13,6 +13,7 @@ from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.health import Ready
 from dropanchor_service.api.routes.shared_parts import SharedParts
 from dropanchor_service.api.routes.site_parts import SiteParts
+from dropanchor_service.api.simulated_tags import SimulatedTags
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.persistence.site_folders import SiteFolders
 from dropanchor_service.persistence.zone_events import ZoneEvents
@@ -44,6 +45,7 @@ class Serving:
         self._credentials = credentials
         self._authenticator = authenticator_of(settings, None if sites.only is None else sites.only.id, recovery)
         self.border = border_of(settings.http, credentials)
+        self.simulated = SimulatedTags()
         self._sites = sites
         self._metrics = metrics
         self.folders = SiteFolders(settings, sites, now_ns, metrics, recovery)
@@ -55,6 +57,11 @@ class Serving:
         """Return what does not work although the service can do its main work."""
         return [*self.folders.problems(), *self.zone_events.problems()]
 
+    def stop(self) -> None:
+        """End other processes: those that read plans, and simulated tags."""
+        self.folders.stop_reading()
+        self.simulated.stop()
+
     def app(
         self,
         answers: AnswersOfSites,
@@ -63,8 +70,9 @@ class Serving:
         stopping: Event,
         receive: ReceiveOfSite,
         receive_health: ReceiveOfSite,
+        url: str,
     ) -> FastAPI:
-        """Return the application; see `create_app_of`."""
+        """Return the application; see `create_app_of`. url: where the service listens."""
         parts = [
             SiteParts(
                 of_site,
@@ -82,10 +90,10 @@ class Serving:
             )
         ]
         return create_app_of(
-            parts, self._shared(stopping), ready=ready, impaired=impaired, registry=self._metrics.registry
+            parts, self._shared(stopping, url), ready=ready, impaired=impaired, registry=self._metrics.registry
         )
 
-    def _shared(self, stopping: Event) -> SharedParts:
+    def _shared(self, stopping: Event, url: str) -> SharedParts:
         http = self._settings.http
         return SharedParts(
             stopping,
@@ -95,4 +103,6 @@ class Serving:
             RateLimiter(http.requests_per_s, http.burst),
             self.border,
             self.folders.basemap,
+            url=url,
+            simulated=self.simulated,
         )

@@ -1,14 +1,13 @@
 """`dropanchor demo`: run the service with simulated tags and watch them in a browser."""
 
 import argparse
-import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_service.api.http.server import ListenError
+from dropanchor_service.api.simulated_tags import SimulatedTags, simulated_settings
 from dropanchor_service.commands.lan import show_addresses
 from dropanchor_service.commands.options import add_service_options, settings_of
 from dropanchor_service.commands.recorded import recorded_tag
@@ -20,7 +19,6 @@ from dropanchor_service.settings.model import PaperSettings, Settings, ZenohSett
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.zenoh_io.session import ZenohError
 from dropanchor_tag_client.recording import RecordingError
-from dropanchor_tag_client.simulator.live import start_poses, tag_name
 
 DESCRIPTION = """\
 Starts the service and simulated tags that drive around one anchor, and prints the address of the page. The tags run in
@@ -39,8 +37,6 @@ examples:
 """
 REFUSED = (SettingsError, ListenError, ZenohError, RecordingError)
 EXIT_DIED = 1
-START_STD_M = 0.1
-STOP_TIMEOUT_S = 1.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,8 +62,9 @@ def run(arguments: argparse.Namespace) -> int:
             interrupts() as interrupt,
             _demo_setup(arguments) as setup,
             Service(setup.settings, compiling=interrupt.raising()) as service,
-            _running_tags(setup) as tags,
+            SimulatedTags() as tags,
         ):
+            tags.start(_tag_words(setup))
             sys.stdout.write(_addresses(service.url))
             show_addresses(service.url, sys.stdout)
             sys.stdout.flush()
@@ -102,8 +99,8 @@ def _demo_setup(arguments: argparse.Namespace) -> Iterator[DemoSetup]:
     if settings.paper == PaperSettings():
         settings = settings.model_copy(update={"paper": PaperSettings(preset="tuned")})
     if arguments.recording is None:
-        simulate = ["simulate", "--tags", str(arguments.tags), "--seed", str(arguments.seed)]
-        tags = _operator_settings(arguments.tags, arguments.seed)
+        simulate = ["simulate", "--until-input-ends", "--tags", str(arguments.tags), "--seed", str(arguments.seed)]
+        tags = simulated_settings(arguments.tags, arguments.seed)
         setup = DemoSetup(settings.model_copy(update={"tags": tags | dict(settings.tags)}), simulate)
         yield setup.without_starts() if arguments.unknown_start else setup
         return
@@ -112,30 +109,9 @@ def _demo_setup(arguments: argparse.Namespace) -> Iterator[DemoSetup]:
         yield setup.without_starts() if arguments.unknown_start else setup
 
 
-def _operator_settings(count: int, seed: int) -> dict[str, TagSettings]:
-    """Return by tag what an operator would know: its start pose and its mounting angle."""
-    return {
-        tag_name(index): TagSettings(
-            start=StartPose(x=start.x, y=start.y, heading_rad=start.heading_rad, std_m=START_STD_M), mount_angle_rad=0.0
-        )
-        for index, start in enumerate(start_poses(count, seed))
-    }
-
-
-@contextmanager
-def _running_tags(setup: DemoSetup) -> Iterator[subprocess.Popen[bytes]]:
-    command = [sys.executable, "-m", "dropanchor_tag_client", *setup.tag_arguments]
-    command += ["--site", setup.settings.site.id, "--connect", _endpoint(setup.settings.zenoh)]
-    process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-    try:
-        yield process
-    finally:
-        process.terminate()
-        try:
-            process.wait(STOP_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+def _tag_words(setup: DemoSetup) -> list[str]:
+    """Return the arguments of `dropanchor-tag`."""
+    return [*setup.tag_arguments, "--site", setup.settings.site.id, "--connect", _endpoint(setup.settings.zenoh)]
 
 
 def _endpoint(zenoh: ZenohSettings) -> str:

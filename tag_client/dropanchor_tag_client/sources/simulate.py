@@ -2,12 +2,14 @@
 
 import argparse
 import math
+import os
 import sys
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from threading import Thread
 
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.host import program
@@ -55,15 +57,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="write a recording with the truth instead of publishing; several tags get a folder each in it",
     )
+    group.add_argument(
+        "--until-input-ends", action="store_true", help="end with the standard input, and so with whoever started it"
+    )
     add_connection_options(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Raises ConnectError, ValueError. Returns 1 when nobody receives the samples."""
     models = sensors(arguments)
+    if arguments.until_input_ends:
+        Thread(target=_end_with_input, daemon=True).start()
     if arguments.out is not None:
         return _write(arguments, models)
     return _publish(arguments, models)
+
+
+def _end_with_input() -> None:
+    """End this process at once when the standard input ends: nobody is left whom closing a session could wait for."""
+    sys.stdin.buffer.read()
+    os._exit(0)
 
 
 def sensors(arguments: argparse.Namespace) -> SensorModels:

@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from dropanchor_service.commands.lan import own_addresses, urls_for_others
+from dropanchor_service.runtime.own_addresses import own_addresses, urls_for_others
 from service.commands.test_key import scanned
 from support.kernel_cache import compile_once
 from support.patience import PATIENCE_S

@@ -45,10 +45,17 @@ def test_the_page_shows_how_to_start_a_tag_and_then_follows_it_on_the_map_and_in
     with watched_page(chromium, place.url) as page:
         page.page.locator("#empty").wait_for(state="visible")
         page.wait_for("document.querySelector('#command').textContent.includes('--connect')")
-        command = page.page.locator("#command").inner_text()
+        command = page.page.locator("#command").text_content() or ""
         assert command.startswith(f"{sysconfig.get_path('scripts')}/dropanchor-tag simulate")
         assert "--connect tcp/127.0.0.1:19747" in command
         assert not page.page.locator("#credentials").is_visible()
+        expect(page.page.get_by_role("button", name="Simulate six tags")).to_be_visible()
+        steps = page.page.locator("#empty li")
+        expect(steps.get_by_role("img", name="done")).to_have_count(1)
+        expect(steps.nth(0)).to_contain_text("✓An anchor")
+        expect(steps.nth(2)).to_contain_text("The service listens on this machine alone")
+        steps.nth(3).get_by_role("button", name="Alerts").click()
+        expect(page.page.locator("#alerts")).to_have_attribute("open", "")
         place.move("cart", x=1.0, y=2.0, speed=0.5, t_ns=time.time_ns() + 60_000_000_000)  # it stays fresh
         page.page.locator("#empty").wait_for(state="hidden")
         line = page.page.locator("tr[data-tag='cart']")

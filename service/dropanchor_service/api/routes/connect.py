@@ -13,6 +13,7 @@ from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.api.routes.shared_parts import shared_of
 from dropanchor_service.api.routes.site_of_request import answers_of
+from dropanchor_service.runtime.own_addresses import urls_for_others
 
 SIMULATED_TAG = "sim-1"
 _FORWARDED = ("forwarded", "x-forwarded-for", "x-real-ip", "via")
@@ -36,7 +37,9 @@ async def get_connect(request: Request) -> Response:
         folder = str(bundle.resolve()) if is_local else bundle.name
     program, anchors = tag_command(show_path=is_local), [anchor.id for anchor in site.anchors]
     command = simulate_command(program, reachable, site.id, anchors, folder)
-    return json_response({"endpoints": reachable, "credentials": credentials is not None, "simulate": command})
+    answer = {"endpoints": reachable, "credentials": credentials is not None, "simulate": command}
+    pages = [] if shared.url is None else [f"{url}/" for url in urls_for_others(shared.url)]
+    return json_response(answer | {"pages": pages, "may_simulate": shared.may_simulate})
 
 
 def _host(request: Request) -> str:

@@ -284,6 +284,8 @@ CONNECT: dict[str, Any] = {
     "endpoints": ["tcp/192.168.1.10:7447"],
     "credentials": False,
     "simulate": "dropanchor-tag simulate --connect tcp/192.168.1.10:7447",
+    "pages": ["http://192.168.1.10:8080/"],
+    "may_simulate": True,
 }
 NO_RECORDING: dict[str, Any] = {"recording": False, "since_ns": None, "tags": None, "file": None}
 RECORDING: dict[str, Any] = {"recording": True, "since_ns": 1_800_000_000_000_000_000, "tags": None, "file": None}

@@ -1,11 +1,9 @@
 """The routes for the app phyphox: the experiment that it loads, its QR code, and what it posts."""
 
 import asyncio
-import io
 from dataclasses import asdict
 from typing import Annotated, Any
 
-import segno
 from fastapi import Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
@@ -13,6 +11,7 @@ from starlette.responses import Response
 from dropanchor_schemas.answers import PhoneReadingsReceived
 from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.wire import Reason, Rejection
+from dropanchor_service.api.formats.qr_code import SVG, qr_code
 from dropanchor_service.api.http.access import secret_of
 from dropanchor_service.api.http.behind_proxy import prefix_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
@@ -30,7 +29,6 @@ from dropanchor_service.phones.phyphox_session import PhyphoxSession
 from dropanchor_tag_client.sources.phones.readings import PhoneError, PhoneTimeError
 from dropanchor_tag_client.sources.phones.session import WAIT_S
 
-SVG = "image/svg+xml"
 _NEVER_STORE = {"cache-control": "no-store"}  # both hold the key
 _COLUMN = {"type": "array", "items": {"type": ["number", "null"]}}
 _BODY = {
@@ -76,9 +74,7 @@ async def get_phyphox_experiment(request: Request, query: Annotated[OfApp, Query
 )
 async def get_phyphox_code(request: Request, query: Annotated[OfTag, Query()]) -> Response:
     link = link_of(_address(request), tag_of(request, query), secret_of(request))
-    written = io.BytesIO()
-    segno.make(link, error="l").save(written, kind="svg", scale=4, border=4, dark="black", light="white")
-    return Response(written.getvalue(), media_type=SVG, headers=_NEVER_STORE)
+    return Response(qr_code(link), media_type=SVG, headers=_NEVER_STORE)
 
 
 def _address(request: Request) -> str:

@@ -10,6 +10,7 @@ from starlette.requests import HTTPConnection
 from dropanchor_service.api.http.borders import ANY_HOST, Border
 from dropanchor_service.api.http.connections import OpenConnections
 from dropanchor_service.api.http.rates import RateLimiter
+from dropanchor_service.api.simulated_tags import SimulatedTags
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.identity import Authenticator
 
@@ -23,6 +24,7 @@ class SharedParts:
     the tags; None when they need none. authenticator: None when every client may do everything. rate_limiter: limits
     the requests of each client; None for no limit. border: which hosts and web pages may use the interface. basemap:
     None when there is none. sample_connections, feed_connections: WebSockets that send samples, and those of omlox.
+    url: where the service listens; its host may stand for all interfaces. simulated: tags that somebody started.
     """
 
     stopping: Event
@@ -35,6 +37,13 @@ class SharedParts:
     started_ns: int = field(default_factory=time.time_ns)
     sample_connections: OpenConnections = field(default_factory=OpenConnections)
     feed_connections: OpenConnections = field(default_factory=OpenConnections)
+    url: str | None = None
+    simulated: SimulatedTags = field(default_factory=SimulatedTags)
+
+    @property
+    def may_simulate(self) -> bool:
+        """Whether the service can start simulated tags itself."""
+        return self.credentials is None and bool(self.endpoints)
 
 
 def shared_of(connection: HTTPConnection) -> SharedParts:

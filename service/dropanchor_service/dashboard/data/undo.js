@@ -39,6 +39,11 @@ export class UndoStack extends EventTarget {
     return this.#done.includes(step) || this.#undone.includes(step);
   }
 
+  /** Return the last start that was given to a tag here, unless it was taken back. @param {string} tag */
+  startOf(tag) {
+    return this.#done.findLast(({ started }) => started?.tag === tag)?.started ?? null;
+  }
+
   /** Keep how to take back what was just done. @param {Step} step */
   push(step) {
     this.#undone.length = 0;

@@ -2,6 +2,7 @@
 
 import { send } from "../data/access.js";
 import { api, getJson } from "../data/connection.js";
+import { drawCode, forOthers, readConnect } from "../data/page_address.js";
 import { t, timeText } from "../i18n/language.js";
 import { refusalInForm } from "../i18n/said.js";
 import { revocableLine } from "./revocable_line.js";
@@ -25,6 +26,7 @@ export class KeyPanel {
   async open() {
     partOf(this.box, "created").hidden = true;
     partOf(this.box, "secret").textContent = "";
+    partOf(this.box, "code").hidden = partOf(this.box, "loopback").hidden = true;
     this.#say("");
     await this.#refresh();
   }
@@ -47,10 +49,22 @@ export class KeyPanel {
     this.#askForTag();
     this.#say("");
     partOf(this.box, "created-what").textContent = t(tag === null ? "access.created" : "access.created_tag", { tag: tag ?? "" });
-    partOf(this.box, "secret").textContent = tag === null ? secret : linkOf(tag, secret);
+    if (tag === null) partOf(this.box, "secret").textContent = secret;
+    else await this.#showLink(tag, secret);
+    partOf(this.box, "code").hidden ||= tag === null;
     partOf(this.box, "created").hidden = false;
     await this.#refresh();
     partOf(this.box, "created").scrollIntoView({ block: "nearest" });
+  }
+
+  /** @param {string} tag @param {string} secret */
+  async #showLink(tag, secret) {
+    const { pages } = await readConnect();
+    const page = forOthers("tag/", pages);
+    const link = linkOf(page ?? new URL("tag/", document.baseURI).href, tag, secret);
+    partOf(this.box, "secret").textContent = link;
+    partOf(this.box, "loopback").hidden = page !== null;
+    await drawCode(/** @type {HTMLImageElement} */ (partOf(this.box, "code")), link);
   }
 
   #askForTag() {
@@ -95,8 +109,5 @@ function lineOf(name, what, expires_ns) {
 }
 
 /** Return the link that makes a phone a tag. Browsers keep what follows the # to themselves, so no log has the key.
- * @param {string} tag @param {string} secret */
-function linkOf(tag, secret) {
-  const values = new URLSearchParams({ tag, key: secret });
-  return `${new URL("tag/", document.baseURI).href}#${values}`;
-}
+ * @param {string} page @param {string} tag @param {string} secret */
+const linkOf = (page, tag, secret) => `${page}#${new URLSearchParams({ tag, key: secret })}`;

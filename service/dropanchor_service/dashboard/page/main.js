@@ -11,6 +11,7 @@ import { chosenSite, Connection } from "../data/connection.js";
 import { Detail } from "../panel/detail.js";
 import { EdgeHints } from "../map/edge_hints.js";
 import { Evidence } from "../data/evidence.js";
+import { FirstHour } from "../panel/first_hour.js";
 import { Finding } from "./finding.js";
 import { Fleet } from "../data/fleet.js";
 import { length, place } from "../data/format.js";
@@ -88,6 +89,8 @@ const finding = new Finding({ map, fleet, roster, choice, table, setup, plans, z
 const alarms = new Alarms(map, connection, setup.changes, choice, zones);
 table.alarmOf = (/** @type {string} */ tag) => alarms.rank(tag);
 notices.alarms = () => alarms.count;
+notices.firstHour = new FirstHour(byId("empty"), setup.changes);
+notices.firstHour.done = () => ({ anchor: map.anchors.length > 0, plan: plans.store.plans.length > 0, tag: fleet.size > 0, told: alerts.store.states.length > 0 });
 const alerts = new Alerts(byId("alerts"), byId("confirm"), connection, zones, setup.changes, panels);
 
 /** Show the details of a tag; null: leave them. @param {string | null} tag @param {() => void} [then] */

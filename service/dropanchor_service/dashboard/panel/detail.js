@@ -17,6 +17,9 @@ import { partOf, write, writeOrHide } from "../page/parts.js";
 
 /** @typedef {import("../data/fleet.js").Fleet} Fleet */
 
+/** For so long a hint names the start that somebody set on this page. */
+const START_S = 120;
+
 export class Detail {
   /** Direction of the x axis, counter-clockwise from east. */
   #rotation_rad = 0;
@@ -93,11 +96,18 @@ export class Detail {
     const reason = current ? value.reason[row] : null;
     write(partOf(this.panel, "meaning"), state.meaning);
     write(partOf(this.panel, "reason"), reason ? words(reason) : "");
-    const hint = current ? hintOf(this.fleet, this.roster, row) : "";
+    const hint = current ? this.#withStart(name, state.trusted, hintOf(this.fleet, this.roster, row)) : "";
     writeOrHide(partOf(this.panel, "hint"), hint);
     this.follow.setAttribute("aria-pressed", String(this.choice.follow));
     partOf(this.panel, "json").setAttribute("href", api(`tags/${encodeURIComponent(name)}/pose`).href);
     partOf(this.panel, "json").hidden = hasKey() || this.fleet.past || !this.fleet.hasPose(row); // a link carries no key
+  }
+
+  /** Name the start that was set just before in a hint about what came of it. @param {string} tag @param {boolean} trusted @param {string} hint */
+  #withStart(tag, trusted, hint) {
+    const set = this.changes?.history.startOf(tag);
+    const seconds = set ? (performance.now() - set.since_ms) / 1000 : Infinity;
+    return hint === "" || trusted || seconds > START_S ? hint : t("tag.hint_after_start", { age: age(seconds), hint });
   }
 
   /** @param {number} row */

@@ -1,7 +1,6 @@
 /** Messages about the page itself: connecting, starting, connection lost, key required, no tags yet. */
 
 import { hasKey, storeKey } from "../data/access.js";
-import { api, getJson } from "../data/connection.js";
 import { age } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { shareToken } from "../data/shared.js";
@@ -10,6 +9,8 @@ import { byId, write } from "../page/parts.js";
 
 export class Notices {
   #shared = new SharedNotice();
+  /** What is shown while there are no tags. @type {import("./first_hour.js").FirstHour | null} */
+  firstHour = null;
   /** Return how many alarms want somebody. */
   alarms = () => 0;
 
@@ -39,19 +40,10 @@ export class Notices {
     this.#shared.update(status === "locked");
     byId("refused").hidden = !hasKey();
     const isEmpty = !isPast && status === "live" && this.connection.stats.frames > 0 && this.fleet.size === 0;
-    if (isEmpty && byId("empty").hidden) this.#requestCommand();
+    const isNew = isEmpty && byId("empty").hidden;
     byId("empty").hidden = !isEmpty;
-  }
-
-  /** Request the command that starts a simulated tag, since the service knows where tags connect. */
-  async #requestCommand() {
-    try {
-      const { simulate, credentials } = await getJson(api("connect"));
-      write(byId("command"), simulate);
-      byId("credentials").hidden = !credentials;
-    } catch {
-      // The connection reports the failure. The command is requested again after it is back.
-    }
+    if (isNew) this.firstHour?.show();
+    this.firstHour?.update();
   }
 
   /** @param {Event} event */

@@ -44,6 +44,7 @@ export default {
   "say.not_saved": "Die Änderung wurde nicht gespeichert: {why}.",
   "say.id_differs": "Die Kennung ist {path} im Pfad und {body} im Inhalt.",
   "say.items_full": "Es gibt schon {n}. Löschen Sie zuerst etwas davon.",
+  "say.no_simulation": "Tags brauchen hier Zugangsdaten, also startet der Dienst keine simulierten.",
   "say.alarm_unknown": "Es gibt keinen Alarm {id}.",
   "say.item_unknown": "Nichts davon hat die Kennung {id}.",
   "say.tag_unknown": "Vom Tag {tag} wurde keine Nachricht angenommen, und es ist nicht eingerichtet. Das Protokoll des Dienstes nennt die Nachrichten, die er ablehnt.",

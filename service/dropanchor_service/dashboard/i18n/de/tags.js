@@ -44,6 +44,7 @@ export default {
   "columns.stopped": "Steht seit",
   "columns.age": "Alter",
   "columns.online": "Online",
+  "tag.hint_after_start": "Sie haben vor {age} angegeben, wo dieses Tag ist. War das falsch, dann machen Sie es rückgängig oder geben Sie es neu an. {hint}",
   "table.tag": "Tag",
   "table.state": "Zustand",
   "table.x": "x",

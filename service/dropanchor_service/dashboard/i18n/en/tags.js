@@ -44,6 +44,7 @@ export default {
   "columns.stopped": "Stands for",
   "columns.age": "Age",
   "columns.online": "Online",
+  "tag.hint_after_start": "You said {age} ago where this tag is. If that was wrong, undo it or say it again. {hint}",
   "table.tag": "Tag",
   "table.state": "State",
   "table.x": "x",
