@@ -44,6 +44,7 @@ class Joined:
     ranges: Ranges
     headings: Headings
     pressures: Stream
+    truth: Stream
     anchors: dict[str, Position]
     t0_ns: int
 
@@ -55,7 +56,7 @@ def merged(parts: Sequence[tuple[str, Readings]], of_one_bag: bool = False) -> R
     """
     whole = Readings()
     for source, part in parts:
-        for sensor in ("acc", "gyro", "mag", "pressure"):
+        for sensor in _NAMES:
             stream = getattr(part, sensor)
             if len(stream) and len(getattr(whole, sensor)):
                 raise ImportingError(
@@ -74,7 +75,7 @@ def merged(parts: Sequence[tuple[str, Readings]], of_one_bag: bool = False) -> R
     return whole
 
 
-_NAMES = {"acc": "accelerometer", "gyro": "gyroscope", "mag": "magnetometer", "pressure": "barometer"}
+_NAMES = {"acc": "accelerometer", "gyro": "gyroscope", "mag": "magnetometer", "pressure": "barometer", "truth": "truth"}
 
 
 def joined(readings: Readings, mounted: Mounting | None = None) -> Joined:
@@ -87,7 +88,7 @@ def joined(readings: Readings, mounted: Mounting | None = None) -> Joined:
     first_ns = min((int(t_ns[0]) for t_ns in times), default=0)
     _require_one_clock(
         {"IMU": imu.t_ns, "ranges": readings.ranges.t_ns, "headings": readings.headings.t_ns}
-        | {"pressures": readings.pressure.t_ns}
+        | {"pressures": readings.pressure.t_ns, "truth": readings.truth.t_ns}
     )
     t0_ns = first_ns // NS_PER_S * NS_PER_S if not 0 <= first_ns < _KEPT_NS else 0
     ranges, headings = readings.ranges, readings.headings
@@ -96,6 +97,7 @@ def joined(readings: Readings, mounted: Mounting | None = None) -> Joined:
         Ranges(ranges.t_ns - t0_ns, ranges.anchors, ranges.range_m, ranges.std_m),
         Headings(headings.t_ns - t0_ns, headings.yaw_rad, headings.std_rad),
         Stream(readings.pressure.t_ns - t0_ns, readings.pressure.values),
+        Stream(readings.truth.t_ns - t0_ns, readings.truth.values),
         readings.anchors,
         t0_ns,
     )

@@ -14,7 +14,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.join import Joined
 from dropanchor_service.importing.progress import shown
 from dropanchor_service.importing.readings import ImportingError, Position
-from dropanchor_tag_client.recording.columns import FILES, HEADING, IMU, PRESSURE
+from dropanchor_tag_client.recording.columns import FILES, HEADING, IMU, PRESSURE, TRUTH
 
 _FILES = tuple(f"{file.name}.csv{end}" for file in FILES for end in ("", ".gz"))
 
@@ -46,6 +46,10 @@ def write_recording(folder: Path, joined: Joined, anchors: dict[str, Position]) 
             columns = list(joined.pressures.values.T)
             header = ("t_s", *PRESSURE.numbers[: len(columns)])
             _write_columns(part / "pressure.csv", header, joined.pressures.t_ns, columns)
+        if len(joined.truth):
+            known = ~np.isnan(joined.truth.values).all(0)
+            header = ("t_s", *np.array(TRUTH.numbers)[known].tolist())
+            _write_columns(part / "truth.csv", header, joined.truth.t_ns, list(joined.truth.values.T[known]))
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from dropanchor_tag_client.recording.table import Table
 from dropanchor_tag_client.recording.units import LATEST_S
 
 ACC, GYRO, MAG, RANGE, HEADING, TIME = "acc", "gyro", "mag", "range", "heading", "time"
-PRESSURE = "pressure"
+PRESSURE, TRUTH = "pressure", "truth"
 MAX_EXAMPLES = 3
 NS_PER_S = 1_000_000_000
 LATEST_NS = round(
@@ -114,13 +114,15 @@ def no_headings() -> Headings:
 class Readings:
     """What one source or several hold. notes: what was decided and converted, for the person. units: by quantity.
 
-    pressure: Pa, and in a second column the temperature of the air, °C, where it is known.
+    pressure: Pa, and in a second column the temperature of the air, °C, where it is known. truth: x, y, z, m, and yaw,
+    rad, of which the last two are NaN where the source has none.
     """
 
     acc: Stream = field(default_factory=no_readings)
     gyro: Stream = field(default_factory=no_readings)
     mag: Stream = field(default_factory=no_readings)
     pressure: Stream = field(default_factory=no_readings)
+    truth: Stream = field(default_factory=no_readings)
     ranges: Ranges = field(default_factory=no_ranges)
     headings: Headings = field(default_factory=no_headings)
     anchors: dict[str, Position] = field(default_factory=dict)
@@ -135,6 +137,7 @@ class Readings:
             self.gyro,
             self.mag,
             self.pressure,
+            self.truth,
             self.ranges,
             self.headings,
             self.anchors,

@@ -31,6 +31,10 @@ def report(joined: Joined) -> list[str]:
     if len(joined.pressures):
         pa = joined.pressures.values[:, 0]
         rows.append(_row("pressure", joined.pressures.t_ns, f"{pa.min():.0f} to {pa.max():.0f} Pa"))
+    if len(joined.truth):
+        low, high = joined.truth.values[:, :2].min(0), joined.truth.values[:, :2].max(0)
+        extent = f"{low[0]:.3g} to {high[0]:.3g} m, {low[1]:.3g} to {high[1]:.3g} m"
+        rows.append(_row("truth", joined.truth.t_ns, extent))
     return [*_aligned(rows), *_clocks(joined)]
 
 

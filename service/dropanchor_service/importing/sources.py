@@ -39,11 +39,11 @@ def read_source(path: Path, choice: Choice) -> Found:
     if (known := archive_known_as([file.name for file in files])) is not None:
         raise ImportingError(f"{path} is not read: {known}")
     tables = [(file, table) for file in files if (table := _table(file, len(files) == 1)) is not None]
-    columns = [table.columns for _, table in tables]
+    columns, name = [table.columns for _, table in tables], path.resolve().name  # that of `.`, too
     if any(map(sensor_logger.is_export, columns)):
-        return Found(sensor_logger.read_export(files, path.name, choice.signs))
+        return Found(sensor_logger.read_export(files, name, choice.signs))
     if any(map(phyphox.is_export, columns)) and not choice.columns:
-        return Found(phyphox.read_export(files, path.name))
+        return Found(phyphox.read_export(files, name))
     if not tables:
         raise ImportingError(
             f"{path}: {_kinds(files)}. A source is a bag of ROS, an MCAP file, an export of Sensor Logger or phyphox, "

@@ -10,6 +10,9 @@ from typing import Any
 import pandas
 import pytest
 
+from dropanchor_service.importing.readings import ImportingError
+from dropanchor_service.importing.tables.units import SI, conversion
+from dropanchor_tag_client.recording import read_recording
 from service.importing.command import Ended, Import
 
 G, DEGREES = 9.80665, math.degrees(0.5)
@@ -91,7 +94,9 @@ def test_an_imu_is_read_whatever_its_columns_are_called(run: Import, content: st
         assert ended.column("imu", "mz") == pytest.approx([-40] * 60)
 
 
-def test_sensor_logger_in_one_file_of_json_is_read_like_its_folder(run: Import) -> None:
+def test_sensor_logger_in_one_file_of_json_is_read_like_its_folder(
+    run: Import, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rows: list[dict[str, str]] = [{"sensor": "Metadata", "platform": "android", "device name": "Phone"}]
     for i in range(50):
         time = {"time": str(1_795_680_000_000_000_000 + 10_000_000 * i), "seconds_elapsed": str(i / 100)}
@@ -105,6 +110,30 @@ def test_sensor_logger_in_one_file_of_json_is_read_like_its_folder(run: Import) 
     assert ended.column("pressure", "pressure_pa") == pytest.approx([98_725] * 50)
     assert "walk.json: an export of Sensor Logger (Phone, android)" in ended.printed
     assert "not used: walk.json: Location" in ended.printed
+    run.file("trip/walk.json", json.dumps(rows))
+    monkeypatch.chdir(run.folder / "trip")
+    assert "trip: an export of Sensor Logger (Phone, android)" in run(".", out="other", imu=True).printed
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "truth"),
+    [
+        ("truth.csv", "t_s,x,y,z,yaw_rad\n0,1,2,0.5,3.1\n1,2,2,0.5,3\n", {"x": 1, "y": 2, "z": 0.5, "yaw_rad": 3.1}),
+        ("groundtruth.txt", "#t tx ty tz qx qy qz qw\n0 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 1\n", {"x": 1, "y": 2, "z": 3}),
+        ("log.csv", "time_s,gt_x [cm],gt_y [cm]\n0,100,200\n1,100,\n2,1,1\n", {"x": 1, "y": 2}),
+    ],
+)
+def test_a_truth_goes_into_the_recording_on_its_clock(
+    run: Import, name: str, content: str, truth: dict[str, float]
+) -> None:
+    uwb = run.file("uwb.csv", UWB)
+    ended = run(uwb, run.file(name, content))
+    assert ended.status == 0, ended.error
+    first = {column: float(value) for column, value in ended.rows("truth")[0].items()}
+    assert first == {"t_s": 0.0} | truth
+    assert len(ended.rows("truth")) == 2
+    assert "truth       2" in ended.printed
+    assert len(read_recording(ended.out).truth["t_s"]) == 2
 
 
 def test_parquet_is_a_table(run: Import) -> None:
@@ -182,6 +211,12 @@ def test_each_advice_works_as_it_is_printed_and_changes_nothing_else(run: Import
     assert min(ended.column("range", "range_m")) > 0
     assert "log.txt: 30 left out: the range is below zero" in ended.printed
     assert "Here:" not in ended.printed
+
+
+@pytest.mark.parametrize("quantity", SI)
+def test_an_unknown_unit_of_any_quantity_is_named_with_those_that_are_known(quantity: str) -> None:
+    with pytest.raises(ImportingError, match=f"'furlongs' is not a known unit: of an? .*{SI[quantity]}"):
+        conversion("furlongs", quantity)
 
 
 def test_counts_of_a_sensor_are_named_with_their_usual_scale(run: Import) -> None:

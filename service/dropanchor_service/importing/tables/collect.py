@@ -1,11 +1,12 @@
 """Collect the rows of a table into columns of numbers, by the fields that a mapping names."""
 
+import math
 from array import array
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from dropanchor_service.importing.readings import RANGE, LeftOut
-from dropanchor_service.importing.tables.mapping import ANCHOR, T_NSEC, VECTORS, WIDE, Fields, T, quantity_of
+from dropanchor_service.importing.tables.mapping import ANCHOR, OPTIONAL, T_NSEC, VECTORS, WIDE, Fields, T, quantity_of
 from dropanchor_service.importing.tables.table import Exact, Table, exact_number, number, text_of
 from dropanchor_service.importing.tables.times import bounded, iso_ns
 from dropanchor_service.importing.tables.units import conversion
@@ -42,7 +43,11 @@ class Collected:
         self.seconds: list[int] = []
         self.lines: list[int] = []
         self.iso = self.zoneless = False
-        self.vectors = {quantity: Kind(names) for quantity, names in VECTORS.items() if names[0] in fields}
+        self.vectors = {
+            quantity: Kind((*names, *OPTIONAL.get(quantity, ())))
+            for quantity, names in VECTORS.items()
+            if names[0] in fields
+        }
         self.ranges = Kind(("range", "std"))
         self.headings = Kind(("heading", "heading_std"))
         self.held = 0
@@ -97,9 +102,10 @@ class _Collector:
 
     def _take_vector(self, quantity: str, kind: Kind, cells: Cells, row: int) -> None:
         values = [self._number(name, cells, row) for name in kind.fields]
-        if None not in values:
-            kind.add(row, [value for value in values if value is not None])
-        elif any(value is not None for value in values):
+        needed = values[: len(VECTORS[quantity])]
+        if None not in needed:
+            kind.add(row, [math.nan if value is None else value for value in values])
+        elif any(value is not None for value in needed):
             self._left_out.add(self._table.name, f"{quantity} lacks an axis", self._out.lines[row])
 
     def _take_ranges(self, cells: Cells, row: int, is_mixed: bool) -> None:

@@ -4,8 +4,18 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, PRESSURE, RANGE, ImportingError
-from dropanchor_service.importing.tables.mapping import ANCHOR, POSITION, T_NSEC, VECTORS, WIDE, Column, T, quantity_of
+from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, PRESSURE, RANGE, TRUTH, ImportingError
+from dropanchor_service.importing.tables.mapping import (
+    ANCHOR,
+    OPTIONAL,
+    POSITION,
+    T_NSEC,
+    VECTORS,
+    WIDE,
+    Column,
+    T,
+    quantity_of,
+)
 from dropanchor_service.importing.tables.units import SI, known
 
 _SENSORS = {
@@ -54,6 +64,8 @@ _STDS = {"std", "stddev", "sigma", "stdev", "uncertainty"}
 _HEADINGS = {"heading", "yaw"}
 _PRESSURES = {"pressure", "press", "barometer", "baro", "barometric", "air", "fluid"}
 _PRESSURE_NAMES = {"pressure", "press", "baro", "barometer"}
+_TRUTHS = {"truth", "groundtruth", "gt", "mocap", "vicon", "optitrack"}
+_OF_TRUTHS = _TRUTHS | {"ground", "position", "pos", "pose", "p", "t", "translation", "true", *_HEADINGS}
 _BARE = {"vector", "value", "values", "data", "xyz"}
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+|°/?s?")
@@ -85,8 +97,9 @@ def guessed(columns: Sequence[str], table: str = "") -> dict[str, Column]:
     table: its name, which tells what columns are that are only named x, y and z.
     """
     best: dict[str, tuple[int, Column]] = {}
+    of_truth = bool(_TRUTHS & set(words_of_name(table)))
     for name in columns:
-        found = _found(name) or _of_table(table, name)
+        found = _found(name, of_truth) or _of_table(table, name)
         if found and (found.field not in best or found.rank < best[found.field][0]):
             best[found.field] = found.rank, Column(name, found.unit, found.sign)
     fields = {field: column for field, (_, column) in best.items()}
@@ -121,7 +134,7 @@ def position_columns(columns: Sequence[str]) -> dict[str, Column]:
 
 def _is_whole(field: str, fields: Mapping[str, Column]) -> bool:
     """Return whether the field is of use: a vector needs its three axes, a deviation its value."""
-    vector = next((names for names in VECTORS.values() if field in names), ())
+    vector = next((names for name, names in VECTORS.items() if field in (*names, *OPTIONAL.get(name, ()))), ())
     if field == "heading_std":
         return HEADING in fields
     return all(name in fields for name in vector)
@@ -132,13 +145,13 @@ def _order(field: str) -> int:
     return order.index(field) if field in order else len(order)
 
 
-def _found(name: str) -> _Found | None:
-    """Return what a column holds, with the unit in brackets or at the end of its name."""
+def _found(name: str, of_truth: bool) -> _Found | None:
+    """Return what a column holds, with the unit in brackets or at the end of its name. of_truth: its table is one."""
     name = name.removeprefix(_ROSTOPIC)
     bracketed = _BRACKETS.match(name)
     if bracketed and bracketed[1] and not bracketed[2].isdigit():
         words = words_of_name(bracketed[1])
-        found = _identified(words) or _by_unit(words, bracketed[2])
+        found = _identified(words, of_truth) or _by_unit(words, bracketed[2])
         if found and name.startswith(_OF_APPLE):
             found = found._replace(sign=-1)
         return found and _with_unit(found, bracketed[2], name)
@@ -149,11 +162,11 @@ def _found(name: str) -> _Found | None:
         return _time(words)
     for count in (3, 2, 1):  # words of a unit at the end, as in gyro_x_rad_s
         unit = "".join(words[-count:])
-        found = _identified(words[:-count]) if len(words) > count else None
+        found = _identified(words[:-count], of_truth) if len(words) > count else None
         quantity = quantity_of(found.field) if found else None
         if found and quantity and not found.unit and known(unit, quantity):
             return found._replace(unit=unit)
-    return _identified(words)
+    return _identified(words, of_truth)
 
 
 def _by_unit(words: list[str], unit: str) -> _Found | None:
@@ -195,8 +208,8 @@ def words_of_name(name: str) -> list[str]:
     return [word.lower() for word in _WORDS.findall(name.replace("°/s", " dps ").replace("µ", "u"))]
 
 
-def _identified(words: list[str]) -> _Found | None:
-    return _vector(words) or _time(words) or _scalar(words) or _wide(words)
+def _identified(words: list[str], of_truth: bool) -> _Found | None:
+    return _true(words, of_truth) or _vector(words) or _time(words) or _scalar(words) or _wide(words)
 
 
 def _vector(words: list[str]) -> _Found | None:
@@ -214,6 +227,15 @@ def _vector(words: list[str]) -> _Found | None:
             rank = len(words) + 10 * len(_WITHOUT_GRAVITY & set(words))
             return _Found(VECTORS[quantity][_AXES[axis]], None, rank)
     return None
+
+
+def _true(words: list[str], of_truth: bool) -> _Found | None:
+    """Return the field of a true place: `gt_x`, or in a table of them `x`, `tx`, `position.x`, `yaw`."""
+    *rest, last = ["".join(words)[:1], words[0][1:]] if len(words) == 1 and words[0][1:] in _AXES else words or [""]
+    of_truth |= bool(_TRUTHS & set(rest))
+    if not of_truth or not set(rest) <= _OF_TRUTHS or (last not in "xyz" and last not in _HEADINGS) or not last:
+        return None
+    return _Found(f"{TRUTH}_{'yaw' if last in _HEADINGS else last}", None, len(words))
 
 
 def _time(words: list[str]) -> _Found | None:

@@ -7,13 +7,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, PRESSURE, RANGE, TIME, ImportingError
+from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, PRESSURE, RANGE, TIME, TRUTH, ImportingError
 from dropanchor_service.importing.tables.units import conversion
 from dropanchor_tag_client.command_line import did_you_mean
 
 T, T_NSEC, ANCHOR = "t", "t_nsec", "anchor"
 WIDE = "range."
 _AXES = {ACC: ("ax", "ay", "az"), GYRO: ("gx", "gy", "gz"), MAG: ("mx", "my", "mz"), PRESSURE: ("pressure",)}
+_AXES |= {TRUTH: ("truth_x", "truth_y")}
+OPTIONAL: Mapping[str, tuple[str, ...]] = {TRUTH: ("truth_z", "truth_yaw")}
+"""Fields beside those of `VECTORS`, which may lack."""
 VECTORS: Mapping[str, tuple[str, ...]] = _AXES
 QUANTITIES: Mapping[str, str] = {
     T: TIME,
@@ -22,6 +25,8 @@ QUANTITIES: Mapping[str, str] = {
     "std": RANGE,
     HEADING: HEADING,
     "heading_std": HEADING,
+    "truth_z": TRUTH,
+    "truth_yaw": HEADING,
 }
 FIELDS = (*QUANTITIES, T_NSEC, ANCHOR)
 POSITION = ("id", "x", "y", "z")

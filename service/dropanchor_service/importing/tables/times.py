@@ -19,6 +19,7 @@ _PLAUSIBLE_HZ = (0.2, 20_000.0)
 _UNITS = ("s", "ms", "us", "ns")
 _WRAP = 2**32
 DAY_NS = 86_400 * NS_PER_S
+_HALF_OF_DAY = re.compile(r"(.*?)(0?[1-9]|1[0-2])(:\d{2}\S*?)\s*([ap])\.?m\.?(.*)", re.IGNORECASE)
 _OF_DAY = re.compile(r"\s*\d{1,2}:\d{2}(:\d{2}|\s*$)")
 
 
@@ -50,8 +51,12 @@ _NAMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nan
 def iso_ns(text: str) -> tuple[int, bool] | None:
     """Return the time of a text in ISO 8601 and whether it names its time zone; None if it is none.
 
-    A time without a zone is taken for UTC, and a time of day for that of the first day of 1970.
+    A time without a zone is taken for UTC, and a time of day for that of the first day of 1970. Hours may be those of
+    AM and PM.
     """
+    if half := _HALF_OF_DAY.fullmatch(text):
+        day, hour, rest, which, zone = half.groups()
+        text = f"{day}{int(hour) % 12 + 12 * (which in 'pP'):02}{rest}{zone}"
     if _OF_DAY.match(text):
         text = f"1970-01-01T{'0' if text.strip()[1] == ':' else ''}{text.strip()}"
     if len(text) < 10 or text[4:5] not in "-0123456789" or not ("-" in text[1:] or "T" in text):

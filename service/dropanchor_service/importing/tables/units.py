@@ -4,13 +4,13 @@ import math
 import re
 from typing import NamedTuple
 
-from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, PRESSURE, RANGE, TIME, ImportingError
+from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, PRESSURE, RANGE, TIME, TRUTH, ImportingError
 
 G_MPS2 = 9.80665  # standard gravity, ISO 80000-3
 INCH_M = 0.0254
 COMPASS, ISO = "deg_compass", "iso"
 
-SI = {ACC: "m/s2", GYRO: "rad/s", MAG: "uT", RANGE: "m", HEADING: "rad", TIME: "s", PRESSURE: "Pa"}
+SI = {ACC: "m/s2", GYRO: "rad/s", MAG: "uT", RANGE: "m", HEADING: "rad", TIME: "s", PRESSURE: "Pa", TRUTH: "m"}
 _FACTORS: dict[str, dict[str, float]] = {
     ACC: {"m/s2": 1.0, "g": G_MPS2, "mg": G_MPS2 / 1e3, "cm/s2": 0.01, "mm/s2": 1e-3},
     GYRO: {"rad/s": 1.0, "deg/s": math.pi / 180, "mdeg/s": math.pi / 180e3, "mrad/s": 1e-3, "rpm": math.pi / 30},
@@ -41,6 +41,7 @@ _ALIASES: dict[str, dict[str, str]] = {
     | dict.fromkeys(("usec", "usecs", "micros", "microsecond", "microseconds"), "us")
     | dict.fromkeys(("nsec", "nsecs", "nanos", "nanosec", "nanosecond", "nanoseconds"), "ns"),
 }
+_FACTORS[TRUTH], _ALIASES[TRUTH] = _FACTORS[RANGE], _ALIASES[RANGE]
 _SCALED = re.compile(r"(.+)([*/])\s*([-+0-9.eE]+)")
 _SUPERSCRIPT = str.maketrans(
     {"²": "2", "⁻": "-", "¹": "1", "µ": "u", "μ": "u", "^": None, " ": None, "·": None, "*": None}
@@ -104,4 +105,6 @@ _WHAT = {
     RANGE: "a range",
     HEADING: "a heading",
     TIME: "a time",
+    PRESSURE: "a pressure",
+    TRUTH: "a place",
 }
