@@ -54,7 +54,7 @@ def test_the_page_shows_how_to_start_a_tag_and_then_follows_it_on_the_map_and_in
         expect(steps.get_by_role("img", name="done")).to_have_count(1)
         expect(steps.nth(0)).to_contain_text("✓An anchor")
         expect(steps.nth(2)).to_contain_text("The service listens on this machine alone")
-        steps.nth(3).get_by_role("button", name="Alerts").click()
+        steps.nth(3).get_by_role("button", name="Choose who is told").click()
         expect(page.page.locator("#alerts")).to_have_attribute("open", "")
         place.move("cart", x=1.0, y=2.0, speed=0.5, t_ns=time.time_ns() + 60_000_000_000)  # it stays fresh
         page.page.locator("#empty").wait_for(state="hidden")
