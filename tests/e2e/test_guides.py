@@ -47,6 +47,7 @@ NOT_RUN = {
     '-H "Content-Type: application/json" \\': "asks a secured service: tests/e2e/test_phone.py",
     "connect-a-robot.md: pip install 'dropanchor-service[ros2]'": _PIP,
     "connect-a-robot.md: dropanchor serve --zenoh-listen tcp/127.0.0.1:7448": "needs ROS 2: tests/e2e/test_ros2.py",
+    "connect-a-robot.md: export ROS_DISTRO=jazzy ROS_DOMAIN_ID=0": "needs ROS 2 and a bridge: tests/e2e/test_ros2.py",
     "import-data.md: dropanchor import drive.mcap --out recordings/drive": f"{_FILES}: tests/service/importing",
     "import-data.md: dropanchor import log.csv --out recordings/drive \\": f"{_FILES}: tests/service/importing",
     "import-data.md: dropanchor import drive.bag --imu /imu/data --range /uwb/gate=1 "

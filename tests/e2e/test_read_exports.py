@@ -18,6 +18,7 @@ from dropanchor_evaluation.reference import fields_page
 from dropanchor_schemas.wire import ENCODING_JSON, Frame, encode_json
 from dropanchor_service.api.formats.track import NESTED, RELATIVES
 from support.guides import blocks_of, follow
+from support.s3 import running_s3
 from support.service import Running, straight_north
 from support.yard import running_yard
 from support.zenoh_router import wait_until
@@ -60,6 +61,12 @@ def test_the_guide_reads_the_exports(tool: str, service: Running, tmp_path: Path
     else:
         assert f"[({poses[-1]['t_ns']}, '{poses[-1]['anchor']}', " in said
         assert "[(True,)]" in said
+
+
+def test_the_guide_keeps_the_exports_in_s3(service: Running, tmp_path: Path) -> None:
+    with running_s3():
+        said = follow([*blocks_of(GUIDE, ""), *blocks_of(GUIDE, "S3")], tmp_path, service.url)
+    assert f" poses of {TAG}" in said
 
 
 @pytest.mark.parametrize("tool", ["pandas", "DuckDB"])

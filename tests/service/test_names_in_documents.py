@@ -17,7 +17,7 @@ FILE = re.compile(r"`(?P<file>[\w./-]+\.(?:py|js|mjs|c|h))`")
 FOLDER = re.compile(r"`(?P<folder>(?:belief|frontend|smoother|estimation|ingest|answers)/[\w/]*)`")
 NAME = re.compile(r"`(?P<name>\w+)(?:\(\))?` in\s+(?:the\s+)?\[?`(?P<file>[\w./-]+\.(?:py|js|mjs|c|h))`")
 # Files that a page tells its reader to write, or that other people wrote.
-NOT_OURS = {"requests_of_a_day.py", "with_pandas.py", "with_duckdb.py", "cmd_fn.c"}
+NOT_OURS = {"requests_of_a_day.py", "with_pandas.py", "with_duckdb.py", "to_s3.py", "cmd_fn.c"}
 
 
 @cache

@@ -22,7 +22,7 @@ from support.http_server import running_server
 ROOT = Path(__file__).parents[2]
 PARTS, PLATFORM = ROOT / "tag_client" / "phones", Path(__file__).parent / "phones"
 GUIDE = (ROOT / "service" / "docs" / "how-to" / "range-with-a-phone.md").read_text()
-MESSAGE, RULES = (re.search(f"```{kind}\n(.*?)```", GUIDE, re.DOTALL)[1] for kind in ("json", "toml"))  # type: ignore[index]
+MESSAGE, RULES = (re.search(f"```{begin}(.*?)```", GUIDE, re.DOTALL)[1] for begin in ("json\n", r"\n(?=\[\[rule)"))  # type: ignore[index]
 
 
 @pytest.mark.parametrize("bearings", [slice(None), slice(0)], ids=["anchor", "tag"])
