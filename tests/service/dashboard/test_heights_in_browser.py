@@ -12,9 +12,9 @@ from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import HeightSource
 from dropanchor_service.plans.floors import follow_floors
 from dropanchor_service.plans.store import PlanStore
+from service.dashboard.past_place import RETENTION, SECOND, iso
 from service.dashboard.place import live_api_bench
 from service.dashboard.plan_place import PlanPlace
-from service.dashboard.test_past_in_browser import RETENTION, SECOND, iso
 from support.browser import WatchedPage, watched_page
 from support.http_server import running_server
 from support.plan_files import image_file

@@ -18,9 +18,9 @@ from dropanchor_service.estimation.columns import State, StateReason
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator
 from service.dashboard.marked_language import speak_marked, unmarked
+from service.dashboard.past_place import link_to, wait_for_past
 from service.dashboard.place import Place, live_api_bench
 from service.dashboard.test_evidence_in_browser import drive, select
-from service.dashboard.test_past_in_browser import link_to, past, wait_for_past  # noqa: F401 - a fixture
 from service.dashboard.zone_place import ZonePlace, disc, served, square, zone_place
 from support.browser import WatchedPage, open_page, watched_page
 from support.http_server import running_server
@@ -117,7 +117,7 @@ def test_every_text_about_measurements_is_from_the_catalogue(chromium: Browser) 
 
 def test_every_text_about_the_past_and_a_lost_connection_is_from_the_catalogue(
     chromium: Browser,
-    past: tuple[Place, int],  # noqa: F811
+    past: tuple[Place, int],
 ) -> None:
     place, end_ns = past
     data = ("first", "second", "turned", "default", "Dock")

@@ -6,11 +6,12 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
+from service.dashboard.past_place import wait_for_past
 from service.dashboard.place import Place, live_api_bench
 from support.browser import WatchedPage, watched_page
 from support.http_server import running_server
@@ -35,6 +36,10 @@ BOXES = """() => {
         labels: dropanchor.drawing().labels,
         dots: dropanchor.tags().map(({ pixel: [x, y] }) => [x - 6, y - 6, x + 6, y + 6]),
     };
+}"""
+BOX = """(selector) => {
+    const { left, right, top, bottom } = document.querySelector(selector).getBoundingClientRect();
+    return { left, right, height: Math.min(bottom, innerHeight) - top };
 }"""
 
 
@@ -173,3 +178,34 @@ def test_the_heading_on_a_rotated_site_counts_from_true_north(chromium: Browser)
             page.wait_for("document.getElementById('site').textContent")
             assert heading_of(page, "cart") == "40° NE"
             assert page.page.locator("[data-part='n-x']").inner_text() == "x"
+
+
+@pytest.mark.parametrize("size", [(640, 400), (844, 390)], ids=["200 % zoom", "phone on its side"])
+def test_little_height_is_enough_for_map_details_and_past_which_back_closes_one_by_one(
+    chromium: Browser, past: tuple[Place, int], size: tuple[int, int]
+) -> None:
+    place, _ = past
+    with watched_page(chromium, place.url, size=size) as page:
+        row = page.page.locator("tr[data-tag='first']")
+        row.wait_for()
+        tools, side = page.page.evaluate(BOX, "#tools"), page.page.evaluate(BOX, "aside")
+        assert page.page.evaluate(BOX, "#map")["height"] > 300
+        assert tools["right"] < side["left"] + 1
+        page.page.locator("#history").click()
+        wait_for_past(page, 3)
+        assert page.page.evaluate(BOX, "#map")["height"] > 200
+        row.click()
+        expect(page.page.locator("#detail h2")).to_have_text("first")
+        assert page.page.evaluate(BOX, "#detail")["height"] > 150
+        page.wait_for("history.state?.is === 'above' && location.hash.includes('tag=first')")
+        page.page.go_back()
+        expect(page.page.locator("#detail")).to_be_hidden()
+        assert page.page.evaluate("dropanchor.past()") is not None
+        page.wait_for("history.state?.is === 'above'")
+        page.page.go_back()
+        expect(page.page.locator("#past")).to_be_hidden()
+        row.click()
+        page.wait_for("history.state?.is === 'above'")
+        page.page.locator("#detail [data-part='close']").click()
+        page.wait_for("history.state?.is === 'below'")  # nothing is open, so nothing is to be closed
+        assert page.errors == []

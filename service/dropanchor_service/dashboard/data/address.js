@@ -38,9 +38,14 @@ export function hashWith(hash, values) {
   return text === "" ? "" : `#${text}`;
 }
 
+/** Write what the page shows into the entry of the history that it went to, instead of what that entry said. */
+export function keepAddress() {
+  if (!isAddressRead()) history.replaceState(history.state, "", known || location.pathname + location.search);
+}
+
 /** Write values after the `#`, without a new entry in the history of the browser. @param {Record<string, string | null>} values */
 export function writeAddress(values) {
   const [hash, isRead] = [hashWith(location.hash, values), isAddressRead()];
-  if (hash !== location.hash) history.replaceState(null, "", hash || location.pathname + location.search);
+  if (hash !== location.hash) history.replaceState(history.state, "", hash || location.pathname + location.search);
   if (isRead) known = location.hash;
 }

@@ -1,6 +1,7 @@
 /** Connect the parts: the stream fills the fleet; map, table and panel show it. */
 
 import { Alerts } from "../alerts/alerts.js";
+import { Back } from "./back.js";
 import { Basemap } from "../basemap/basemap.js";
 import { OnlyChip } from "../panel/only_chip.js";
 import { Alarms } from "../alarms/alarms.js";
@@ -197,6 +198,7 @@ function updatePanels() {
   setup.update();
   notices.update();
   address.update();
+  back.update();
   edges.update();
   byId("crowd").hidden = !map.stats.density;
   map.redraw();
@@ -223,6 +225,7 @@ document.addEventListener("keydown", (event) => {
 });
 
 showChoices();
+const back = new Back(panels);
 const address = new ViewAddress(choice, map, /** @type {HTMLInputElement} */ (byId("filter")), pickAll);
 new Notifications(byId("notifications"), zones.log, (event) => zones.pick(event));
 new Kiosk({
