@@ -5,6 +5,7 @@ from enum import StrEnum
 from pydantic import Field
 
 from dropanchor_schemas.models import Frozen
+from dropanchor_schemas.past import Past
 from dropanchor_schemas.pose import Hypothesis, Phrase, Pose
 
 
@@ -124,3 +125,4 @@ class Explanation(Frozen):
         description="How late the poses come at most, because the tag's IMU samples arrive in batches and its ranges "
         "wait for them; 0 for a tag whose samples come in time.",
     )
+    past: Past | None = Field(default=None, description="With `at`: what led to this pose and came next; else null.")

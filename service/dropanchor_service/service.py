@@ -17,6 +17,7 @@ from dropanchor_service.answers.of_sites import answers_of_sites
 from dropanchor_service.api.http.server import build_server, listen
 from dropanchor_service.api.http.thread import HttpThread
 from dropanchor_service.api.starting import CurrentApp, Gate, create_starting_app
+from dropanchor_service.blackbox.opened import beside, open_box
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.checkpoints.thread import CheckpointThread
 from dropanchor_service.engines.compilation import CompilationProgress
@@ -135,6 +136,7 @@ class Service:
             self._opened.enter_context(self._ownership)
             self._opened.enter_context(self._serving.folders)
             self._start_checkpoints()
+            self._opened.enter_context(self._box or nullcontext())
             self._thread.start()
             self._opened.callback(self._thread.stop)
             self._opened.enter_context(self._serving.zone_events)
@@ -164,6 +166,8 @@ class Service:
 
     def _build_ingest(self, engine: Engine) -> None:
         guarded = GuardedEngine(engine, self.sites, self.metrics)
+        state = ServiceState(self.sites, self.latest, guarded, self._publishers) if guarded.keeps_state else None
+        self._box = open_box(self._settings, self.sites, state, self.clock.now_ns)
         self._ingest = Ingest(
             self._buffer,
             Admission(self.sites),
@@ -173,11 +177,13 @@ class Service:
             self.latest,
             self.metrics,
             self.clock,
-            observers=self._serving.folders.observers,
+            observers=beside(self._box, self._serving.folders.observers),
             reorder_ns=round(self._settings.ingest.reorder_ms * 1e6),
         )
         self._from_http = FromHttp(self.sites, self._ingest.health, self.clock, self._buffer.append)
-        self._checkpoints = self._checkpointer(guarded)
+        self._checkpoints: CheckpointThread | None = None  # without a place or with an engine that keeps no state
+        if state is not None and (kept := self._ownership.checkpoints(state, self._recovery)) is not None:
+            self._checkpoints = CheckpointThread(state, kept, self.metrics, self._settings.checkpoint_s, self.clock)
         self._thread = IngestThread(
             self._ingest,
             self._buffer,
@@ -190,6 +196,8 @@ class Service:
     def _between_turns(self) -> None:
         if self._checkpoints is not None:
             self._checkpoints.between_turns()
+        if self._box is not None:
+            self._box.between_turns(self._ingest.has_pending)
         self._processed.between_turns()
 
     def __exit__(self, *_: object) -> None:
@@ -211,8 +219,9 @@ class Service:
     def impairments(self) -> Sequence[str]:
         """Return what does not work although the service can do its main work."""
         of_checkpoints = self._checkpoints.problem if self._checkpoints else None
-        of_files, of_clock = self._recovery.problems(), self.clock.problem
-        found = [*self._ownership.impairments(), *self._serving.problems(), *of_files, of_checkpoints, of_clock]
+        of_box, of_clock = self._box.problem if self._box else None, self.clock.problem
+        of_parts = [*self._ownership.impairments(), *self._serving.problems(), *self._recovery.problems()]
+        found = [*of_parts, of_checkpoints, of_box, of_clock]
         return [problem for problem in found if problem is not None]
 
     @property
@@ -235,15 +244,6 @@ class Service:
         if self._checkpoints is not None:
             threads["checkpoints"] = self._checkpoints.is_alive
         return sorted({*self._supervision.dead_threads, *(name for name, is_alive in threads.items() if not is_alive)})
-
-    def _checkpointer(self, engine: GuardedEngine) -> CheckpointThread | None:
-        """Return the thread that writes checkpoints; None without a place or with an engine that keeps no state."""
-        if not engine.keeps_state:
-            return None
-        state = ServiceState(self.sites, self.latest, engine, self._publishers)
-        kept = self._ownership.checkpoints(state, self._recovery)
-        every_s = self._settings.checkpoint_s
-        return None if kept is None else CheckpointThread(state, kept, self.metrics, every_s, self.clock)
 
     def _write_last_checkpoint(self, checkpoints: CheckpointThread) -> None:
         if self.gone:
@@ -297,4 +297,4 @@ class Service:
             return not (found := self.problems()), found
 
         takes = (self._from_http.samples, self._from_http.health)
-        return self._serving.app(self.answers, ready, self.impairments, self._stopping, *takes, url=self.url)
+        return self._serving.app(self.answers, ready, self.impairments, self._stopping, *takes, self.url, self._box)

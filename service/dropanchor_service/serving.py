@@ -14,6 +14,7 @@ from dropanchor_service.api.routes.health import Ready
 from dropanchor_service.api.routes.shared_parts import SharedParts
 from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.api.simulated_tags import SimulatedTags
+from dropanchor_service.blackbox.box import BlackBox
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.persistence.site_folders import SiteFolders
 from dropanchor_service.persistence.zone_events import ZoneEvents
@@ -71,6 +72,7 @@ class Serving:
         receive: ReceiveOfSite,
         receive_health: ReceiveOfSite,
         url: str,
+        box: BlackBox | None,
     ) -> FastAPI:
         """Return the application; see `create_app_of`. url: where the service listens."""
         parts = [
@@ -84,6 +86,7 @@ class Serving:
                 recorder=folder.recorder,
                 max_tags=site.quota.max_tags,
                 omlox=folder.omlox,
+                box=box,
             )
             for site, of_site, folder, events in zip(
                 self._sites, answers, self.folders.all, self.zone_events.parts, strict=True

@@ -99,6 +99,10 @@ _TAGS = [
     {"name": "shares", "description": "Links that show the page, read only, until they expire."},
     {"name": "keys", "description": "API keys for people, programs and phones."},
     {"name": "ingest", "description": "Samples over HTTP, for tags that do not speak Zenoh."},
+    {
+        "name": "past",
+        "description": "What the black box knows: raw samples of the last hours, and what became of them.",
+    },
     {"name": "recordings", "description": "MCAP files with raw samples and poses."},
     {"name": "health", "description": "Health checks for supervisors, and metrics for Prometheus."},
 ]

@@ -96,9 +96,9 @@ def bytes_of(array: Array) -> Array:
     return array.reshape(-1).view(np.uint8)
 
 
-def sealed(header: Mapping[str, Any], arrays: Iterable[Array]) -> list[bytes]:
+def sealed(header: Mapping[str, Any], arrays: Iterable[Array], level: int = _LEVEL) -> list[bytes]:
     """Return a line of JSON and the bytes of arrays behind it, packed, and the digest of that."""
-    packing, digest = zstandard.ZstdCompressor(_LEVEL).compressobj(), hashlib.blake2b(digest_size=_DIGEST_BYTES)
+    packing, digest = zstandard.ZstdCompressor(level).compressobj(), hashlib.blake2b(digest_size=_DIGEST_BYTES)
     packed = [packing.compress(orjson.dumps(header) + b"\n"), *(packing.compress(array.data) for array in arrays)]
     packed.append(packing.flush())
     for part in packed:

@@ -22,7 +22,7 @@ from dropanchor_service.runtime.recovery import COPY
 
 DATA, SECURITY, SETTINGS = "data", "security", "settings.toml"
 CHECKSUMS = "SHA256SUMS"
-_NOT_COPIED = ("owner.lock", ".lock", "*.part", "*.sqlite-wal", "*.sqlite-shm", "kernels-*")
+_NOT_COPIED = ("owner.lock", ".lock", "*.part", "*.sqlite-wal", "*.sqlite-shm", "kernels-*", "*.box")
 _BUSY_S = 30.0
 _DATED = "%Y%m%dT%H%M%SZ"
 

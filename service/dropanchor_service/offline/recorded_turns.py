@@ -39,25 +39,30 @@ class RecordedClock(UtcClock):
 
 
 class OfflineService:
-    """The ingest and the engine of the service without a network. metrics: the same counters as live."""
+    """The ingest and the engine of the service without a network. metrics: the same counters as live.
 
-    def __init__(self, settings: Settings, document: SiteDocument) -> None:
-        self.site = SiteStore(document.site, dict(document.tags))
-        sites = Sites([(self.site, Quota("accept", _MAX_TAGS, _MAX_TAGS))])
+    What a checkpoint holds may be restored before the first turn.
+    """
+
+    def __init__(self, settings: Settings, document: SiteDocument, defaults: TagSettings | None = None) -> None:
+        self.site = SiteStore(document.site, dict(document.tags), tag_defaults=defaults)
+        self.sites = sites = Sites([(self.site, Quota("accept", _MAX_TAGS, _MAX_TAGS))])
         self.tags = sites[0].tags
         self.metrics = Metrics()
-        self._clock = RecordedClock()
+        self.engine = GuardedEngine(create_engine(settings), sites, self.metrics)
+        self.latest, self.publishers = LatestPoses(), Publishers()
+        self.clock = RecordedClock()
         self._buffer = MessageBuffer(_BUFFER_BYTES)
         self._poses: list[Array] = []
         self._ingest = Ingest(
             self._buffer,
             Admission(sites),
-            GuardedEngine(create_engine(settings), sites, self.metrics),
-            Publishers(),
+            self.engine,
+            self.publishers,
             sites,
-            LatestPoses(),
+            self.latest,
             self.metrics,
-            self._clock,
+            self.clock,
             observers=Observers(poses=self._poses.append),
             reorder_ns=round(settings.ingest.reorder_ms * 1e6),
         )
@@ -67,12 +72,13 @@ class OfflineService:
         last_ns = 0
         for turn in turns:
             last_ns = turn.t_ns
-            yield turn, self._take(turn)
+            yield turn, self.take(turn)
         end = Turn(last_ns + SETTLE_NS)
-        yield end, self._take(end)
+        yield end, self.take(end)
 
-    def _take(self, turn: Turn) -> Array:
-        self._clock.t_ns = turn.t_ns
+    def take(self, turn: Turn) -> Array:
+        """Run a turn. Return its POSE rows."""
+        self.clock.t_ns = turn.t_ns
         if turn.site is not None:
             self._adopt(turn.site)
         self._ingest.turn()  # releases pending messages that were due before this turn

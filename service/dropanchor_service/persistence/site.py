@@ -68,13 +68,9 @@ class Persistence:
         folder = settings.data_dir
         if folder is None:
             return
-        metadata = {
-            "engine": settings.engine,
-            "paper": settings.paper.model_dump_json(),
-            "ingest": settings.ingest.model_dump_json(),
-        }
         period_ns = round(settings.recording.pose_period_s * 1e9)
-        self.recorder = Recorder(folder, file_limits_of(settings.recording), period_ns, tags, site, now_ns, metadata)
+        limits, metadata = file_limits_of(settings.recording), settings.of_replays
+        self.recorder = Recorder(folder, limits, period_ns, tags, site, now_ns, metadata)
 
     def __enter__(self) -> Self:
         for writer in (self.tracks, self.recorder):

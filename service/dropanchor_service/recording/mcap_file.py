@@ -22,13 +22,10 @@ class TooManyChannelsError(Exception):
     """The file has as many topics as the format allows."""
 
 
-class McapFile:
-    """An MCAP file. `add` collects messages in memory; `flush` appends them as one chunk, whole or not at all."""
+class McapBytes:
+    """The bytes of an MCAP file. `add` collects messages; `taken` returns them as one chunk."""
 
-    def __init__(self, path: Path, metadata: Mapping[str, str]) -> None:
-        """Create the file. Raises OSError, also when the file exists."""
-        self.path = path
-        self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o640)
+    def __init__(self, metadata: Mapping[str, str]) -> None:
         self._output = _OutputBuffer()
         self._writer = Writer(cast("IO[Any]", self._output), compression=CompressionType.ZSTD)
         self._writer.start(profile=PROFILE)
@@ -36,8 +33,6 @@ class McapFile:
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._is_finished = False
-        self.size = 0
-        self.opened_ns = time.monotonic_ns()
 
     def add(self, topic: str, schema: str, log_ns: int, t_ns: int, message: bytes) -> None:
         """Add a JSON message. log_ns and t_ns become `log_time` and `publish_time`. Raises TooManyChannelsError."""
@@ -47,6 +42,41 @@ class McapFile:
                 raise TooManyChannelsError
             channel = self._channels[topic] = self._writer.register_channel(topic, "json", self._schema(schema))
         self._writer.add_message(channel, log_ns, message, t_ns)
+
+    def taken(self) -> bytes:
+        """Return what was added since the last call."""
+        if not self._is_finished:
+            self._writer.flush()
+        found, self._output.pending = bytes(self._output.pending), bytearray()
+        return found
+
+    def end(self) -> bytes:
+        """Return what was added since the last call, and the index. Nothing may be added any more."""
+        self._end()
+        return self.taken()
+
+    def _end(self) -> None:
+        if not self._is_finished:
+            self._writer.finish()
+            self._is_finished = True
+
+    def _schema(self, name: str) -> int:
+        if name not in self._schemas:
+            text = json.dumps(schemas.all_schemas()[name]).encode()
+            self._schemas[name] = self._writer.register_schema(name, "jsonschema", text)
+        return self._schemas[name]
+
+
+class McapFile(McapBytes):
+    """An MCAP file. `flush` appends the added messages as one chunk, whole or not at all."""
+
+    def __init__(self, path: Path, metadata: Mapping[str, str]) -> None:
+        """Create the file. Raises OSError, also when the file exists."""
+        self.path = path
+        self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o640)
+        super().__init__(metadata)
+        self.size = 0
+        self.opened_ns = time.monotonic_ns()
 
     def flush(self) -> None:
         """Write the added messages to the file.
@@ -68,19 +98,11 @@ class McapFile:
 
     def finish(self) -> None:
         """Write the index and close the file. Raises OSError, and then may be called again."""
-        if not self._is_finished:
-            self._writer.finish()
-            self._is_finished = True
+        self._end()
         self.flush()
         os.fsync(self._fd)
         sync_folder(self.path.parent)
         os.close(self._fd)
-
-    def _schema(self, name: str) -> int:
-        if name not in self._schemas:
-            text = json.dumps(schemas.all_schemas()[name]).encode()
-            self._schemas[name] = self._writer.register_schema(name, "jsonschema", text)
-        return self._schemas[name]
 
 
 class _OutputBuffer:

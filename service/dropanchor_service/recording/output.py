@@ -4,7 +4,7 @@ import logging
 import threading
 import time
 from base64 import b64encode
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
@@ -24,6 +24,14 @@ PACKED, JSON = "samples_packed", "samples"  # the last part of a topic, by the e
 
 Messages = Sequence[tuple[int, bytes, str, int]]
 """Row, payload, encoding, UTC of arrival in ns."""
+
+
+def samples_messages(payload: bytes, encoding: str) -> Iterator[tuple[str, str, bytes]]:
+    """Yield the last part of the topic, the schema and the JSON of a message. The decoder rejects other encodings."""
+    if encoding.startswith(ENCODING_PACKED):
+        yield PACKED, PACKED_SAMPLES, b'{"data":"' + b64encode(payload) + b'"}'
+    elif encoding.startswith(ENCODING_JSON):
+        yield JSON, SAMPLES, payload
 
 
 @dataclass(frozen=True)
@@ -153,11 +161,8 @@ class Output:
     def _add_samples(self, file: McapFile, turn_ns: int, messages: Messages) -> None:
         for row, payload, encoding, arrival_ns in messages:
             try:
-                if encoding.startswith(ENCODING_PACKED):
-                    message = b'{"data":"' + b64encode(payload) + b'"}'
-                    file.add(self._topic(row, PACKED), PACKED_SAMPLES, turn_ns, arrival_ns, message)
-                elif encoding.startswith(ENCODING_JSON):  # the decoder rejected any other encoding
-                    file.add(self._topic(row, JSON), SAMPLES, turn_ns, arrival_ns, payload)
+                for leaf, schema, message in samples_messages(payload, encoding):
+                    file.add(self._topic(row, leaf), schema, turn_ns, arrival_ns, message)
                 self.written += 1
             except TooManyChannelsError:
                 self._omit(file)

@@ -8,6 +8,6 @@ OF_SITE = (
 OF_SERVICE = (
     *OF_SITE,
     *("owner.lock", ".lock", "written_by", "site", "sites", "checkpoints", "share_key*", "share_links.json*"),
-    *("kernels-*", "cluster"),
+    *("kernels-*", "cluster", "blackbox"),
 )
 """Patterns of all that a service writes there; the rest is somebody else's."""

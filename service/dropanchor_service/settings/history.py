@@ -1,4 +1,4 @@
-"""The settings of what is kept: the history and the recordings."""
+"""The settings of what is kept: the history, the recordings and the black box."""
 
 from pathlib import Path
 from typing import Annotated
@@ -73,4 +73,14 @@ class RecordingSettings(Exact):
     keep_days: Annotated[float, Field(gt=0, le=36_500)] = Field(default=30.0, description="Delete older files.")
     max_mib: Annotated[float, Field(ge=1)] = Field(
         default=16_384.0, description="Size of all files; the oldest make room."
+    )
+
+
+class BlackBoxSettings(Exact):
+    """What all tags sent in the last hours, in `data_dir`/blackbox, so that the past can be explained."""
+
+    enabled: bool = Field(default=True, description="Whether to keep it. It needs a `data_dir`.")
+    keep_hours: Annotated[float, Field(gt=0, le=8760)] = Field(default=24.0, description="Delete what is older.")
+    max_mib: Annotated[float, Field(ge=16)] = Field(
+        default=2048.0, description="Size of the black box; the oldest makes room. It also does where the disk is full."
     )

@@ -15,7 +15,7 @@ from dropanchor_service.settings.basemap import BasemapSettings
 from dropanchor_service.settings.buckets import refuse_unfit_buckets
 from dropanchor_service.settings.cluster import ClusterSettings
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, EventSettings, MqttSettings
-from dropanchor_service.settings.history import HistorySettings, RecordingSettings
+from dropanchor_service.settings.history import BlackBoxSettings, HistorySettings, RecordingSettings
 from dropanchor_service.settings.http import HttpSettings
 from dropanchor_service.settings.ids import SettingsId, SiteId
 from dropanchor_service.settings.layers import Layer
@@ -189,6 +189,7 @@ class Settings(_Section):
     ingest: IngestSettings = IngestSettings()
     history: HistorySettings = HistorySettings()
     recording: RecordingSettings = RecordingSettings()
+    blackbox: BlackBoxSettings = BlackBoxSettings()
     events: EventSettings = EventSettings()
     delivery: DeliverySettings = DeliverySettings()
     email: EmailSettings = EmailSettings()
@@ -214,6 +215,15 @@ class Settings(_Section):
     @property
     def layers(self) -> Sequence[Layer]:
         return self._layers
+
+    @property
+    def of_replays(self) -> dict[str, str]:
+        """What a replay of samples needs of the settings, beside the site."""
+        return {
+            "engine": self.engine,
+            "paper": self.paper.model_dump_json(),
+            "ingest": self.ingest.model_dump_json(),
+        }
 
     @property
     def quota(self) -> Quota:

@@ -188,6 +188,12 @@ class LastInnovations(Exact):
     """The query of the route that explains a pose."""
 
     last: int = Field(default=50, ge=1, le=300, description="How many of the newest innovations to return.")
+    at: TimeNs | None = Field(
+        default=None,
+        description="Explain the pose of this time (UTC in ns, or ISO 8601 with a time zone) as it was explained then, "
+        "and say in `past` what led to it and came next. Another process runs for some seconds what the black box "
+        "holds. Share links explain the latest pose only.",
+    )
 
 
 @contextmanager

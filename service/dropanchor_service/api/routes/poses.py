@@ -32,6 +32,7 @@ from dropanchor_service.api.routes.parameters import (
     id_of,
     json_response,
 )
+from dropanchor_service.api.routes.past import OF_RUNS, explained
 from dropanchor_service.api.routes.site_of_request import answers_of
 
 PIECE_BYTES = 400_000  # larger writes are copied repeatedly while the kernel does not accept all of them
@@ -109,13 +110,15 @@ router.add_api_route(
 
 @router.get(
     "/tags/{tag}/explain",
-    summary="Explain the latest pose of a tag",
+    summary="Explain the latest pose of a tag, or its pose at a time",
     response_model=Explanation,
     responses=example_response(examples.EXPLANATION)
-    | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.INVALID_REQUEST),
+    | problems(*OF_RUNS, Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.INVALID_REQUEST),
 )
 async def explain_pose(tag: TagId, query: Annotated[LastInnovations, Query()], request: Request) -> Response:
     answers = answers_of(request)
+    if query.at is not None:
+        return json_response(await explained(request, tag, query.at, query.last))
     explanation = explanation_of(answers, known_tag(answers, tag), query.last)
     if explanation is None:
         raise _no_pose_yet(answers, tag)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.answers.answers import Answers
+from dropanchor_service.blackbox.box import BlackBox
 from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.phones.intake import Receive
 from dropanchor_service.plans.store import PlanStore
@@ -18,6 +19,7 @@ class SiteParts:
 
     plans: floor plans. events: zones, events and destinations. max_tags: how many tags the site admits. omlox: what
     omlox clients have said; None for no omlox interface. refusal_of: returns why the site refuses all samples of a tag.
+    box: the black box of all sites, None without one.
     """
 
     answers: Answers
@@ -28,6 +30,7 @@ class SiteParts:
     recorder: Recorder | None = None
     max_tags: int = 20_000
     omlox: OmloxItems | None = None
+    box: BlackBox | None = None
     refusal_of: Callable[[str], Reason | None] = lambda _: None
 
     @property

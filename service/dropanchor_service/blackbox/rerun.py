@@ -1,0 +1,141 @@
+"""Run one tag again, from a checkpoint of the black box: the same code as live, and the same poses."""
+
+from collections import Counter, deque
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from prometheus_client import Counter as PrometheusCounter
+
+from dropanchor_schemas.past import IncidentKind
+from dropanchor_schemas.sentences import say
+from dropanchor_schemas.site import TagSettings
+from dropanchor_service.answers.answers import Answers
+from dropanchor_service.answers.columns import REASONS
+from dropanchor_service.answers.frames import STATES, in_site_frame
+from dropanchor_service.blackbox.chosen import BoxError, chosen, turns_of
+from dropanchor_service.checkpoints.format import CheckpointError
+from dropanchor_service.checkpoints.snapshot import ServiceState
+from dropanchor_service.estimation.columns import POSE, Array
+from dropanchor_service.offline.recorded_turns import OfflineService, settings_of
+from dropanchor_service.recording.reading import Turn
+from dropanchor_service.settings.model import Settings
+
+MOST_INCIDENTS = 200
+SECOND_NS = 1_000_000_000
+
+
+class Rerun:
+    """A tag of a site, and what becomes of it. `run_to` goes on from where the last one ended.
+
+    poses: POSE of the run. states: time, state and reason where they changed. incidents: what happened to its samples.
+    Creating it raises BoxError.
+    """
+
+    def __init__(self, folder: Path, site: str, tag: str, from_ns: int, to_ns: int) -> None:
+        pieces = chosen(folder, from_ns, to_ns)
+        self.begin_ns = pieces[0].from_ns
+        try:
+            head, checkpoint = pieces[0].head(), pieces[0].checkpoint()
+            document = head.documents[site]
+            settings = settings_of(head.metadata, Settings(engine_threads=1), None)
+            self.service = OfflineService(settings, document, TagSettings.model_validate(head.defaults[site]))
+            if checkpoint is not None:
+                self._restore(*checkpoint)
+        except (OSError, KeyError, CheckpointError) as error:
+            sentence = say("box_unusable", "The black box cannot be used at that time: {why}.", why=error)
+            raise BoxError(sentence) from error
+        self._name = tag
+        self.poses: list[Array] = []
+        self.states: list[tuple[int, str, str]] = []
+        self.incidents: deque[dict[str, Any]] = deque(maxlen=MOST_INCIDENTS)
+        self._counts = self._counted()
+        references = {name for name, one in document.tags.items() if one.height_motion == "reference"}
+        self._turns = turns_of(pieces, site, {tag, *references}, self.begin_ns, to_ns)
+        self._next: Turn | None = None
+
+    def _restore(self, layout: str, snapshot: Any) -> None:
+        service = self.service
+        state = ServiceState(service.sites, service.latest, service.engine, service.publishers)
+        state.restore(state.as_present(layout, snapshot))
+
+    @property
+    def answers(self) -> Answers:
+        """The answers of the service at the time that the run has reached."""
+        service = self.service
+        return Answers(service.site, service.tags, service.latest, service.clock.now_ns)
+
+    @property
+    def row(self) -> int | None:
+        found = self.service.tags.find(self._name)
+        return None if found is None else found.row
+
+    def run_to(self, to_ns: int, adopt: bool = True) -> None:
+        """Run the turns until a time. adopt: follow the changes of the settings."""
+        for turn in self._until(to_ns):
+            if not adopt:
+                turn.site = None
+            self._take(turn)
+        self._take(Turn(to_ns))
+
+    def _until(self, to_ns: int) -> Iterator[Turn]:
+        while True:
+            turn = self._next or next(self._turns, None)
+            self._next = None
+            if turn is None:
+                return
+            if turn.t_ns > to_ns:
+                self._next = turn
+                return
+            yield turn
+
+    def _take(self, turn: Turn) -> None:
+        poses = self.service.take(turn)
+        own = poses[poses["row"] == self.row] if self.row is not None else poses[:0]
+        if len(own):
+            self.poses.append(own.copy())
+            self._note_state(own[-1])
+        self._note_incidents(turn.t_ns)
+
+    def _note_state(self, pose: Array) -> None:
+        published = in_site_frame(pose[None])[0]
+        state, reason = STATES[published["state"]], REASONS[pose["reason"]]
+        if not self.states or self.states[-1][1:] != (state, reason):
+            self.states.append((int(pose["t_ns"]), state, reason))
+
+    def _note_incidents(self, t_ns: int) -> None:
+        counts = self._counted()
+        if counts == self._counts:
+            return
+        for what, count in (counts - self._counts).items():
+            last = next((one for one in reversed(self.incidents) if (one["kind"], one["reason"]) == what), None)
+            if last is not None and t_ns - last["t_ns"] < SECOND_NS:
+                last["count"] += count
+            else:
+                self.incidents.append({"t_ns": t_ns, "kind": what[0], "reason": what[1], "count": count})
+        self._counts = counts
+
+    def _counted(self) -> Counter[tuple[str, str | None]]:
+        found, metrics = self.service.tags.find(self._name), self.service.metrics
+        rejected = {} if found is None else {(IncidentKind.REJECTED.value, why): n for why, n in found.rejected.items()}
+        of_all = {
+            IncidentKind.CLOCK_JUMP: metrics.clock_jumps,
+            IncidentKind.RESTART: metrics.sequence_restarts,
+            IncidentKind.MISSING: metrics.given_up,
+        }
+        return Counter(rejected | {(kind.value, None): _value(counter) for kind, counter in of_all.items()})
+
+    def track(self, from_ns: int, to_ns: int) -> dict[str, list[Any]]:
+        """Return the `TrackColumns` of a period of the run."""
+        poses = np.concatenate([np.empty(0, POSE), *self.poses])
+        poses = in_site_frame(poses[(poses["t_ns"] >= from_ns) & (poses["t_ns"] <= to_ns)])
+        names = {"x": "x", "y": "y", "heading_rad": "heading", "speed_mps": "speed", "sigma_pos_m": "sigma_pos"}
+        columns: dict[str, list[Any]] = {field: poses[name].tolist() for field, name in names.items()}
+        return (
+            {"t_ns": poses["t_ns"].tolist()} | columns | {"state": [STATES[state] for state in poses["state"].tolist()]}
+        )
+
+
+def _value(counter: PrometheusCounter) -> int:
+    return int(next(iter(counter.collect())).samples[0].value)
