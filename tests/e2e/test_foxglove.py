@@ -3,7 +3,6 @@
 import re
 import signal
 import subprocess
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import pairwise
@@ -128,9 +127,7 @@ def test_what_cannot_start_says_why(service: Running, capsys: pytest.CaptureFixt
     taken = service.url.rpartition(":")[2]
     assert main(["foxglove", "--url", f"http://127.0.0.1:{free_port()}"]) == 2
     assert main(["foxglove", "--url", service.url, "--port", taken]) == 2
-    began_s = time.monotonic()
     assert main(["foxglove", "--url", service.url, "--host", "0.0.0.0"]) == 2
-    assert time.monotonic() - began_s < 5.0
     away, in_use, exposed = capsys.readouterr().err.splitlines()
     assert "does not answer" in away
     assert "in use" in in_use

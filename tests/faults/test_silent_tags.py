@@ -29,7 +29,7 @@ HERE = [f"here-{number}" for number in range(int(os.environ.get("DROPANCHOR_STAY
 """The figures in service/docs/results/survives.md are for 60 and 40. `pytest -s` prints them."""
 
 HZ = 10
-MAX_SILENCE_S = 1.0
+MAX_SILENCE_S = 8.0  # a receive thread that closes a connection waits for 10 s
 AFTER_S = 2.0  # the observation continues so long after the router has closed the last connection
 
 # Runs tags with a connection each until the process is killed. The first argument is an endpoint, or a folder with

@@ -3,7 +3,6 @@
 import asyncio
 import gc
 import socket
-import statistics
 import time
 from contextlib import closing
 from threading import Event
@@ -30,6 +29,10 @@ class ShortDeadlines(GuardedProtocol):
 class LongDeadlines(GuardedProtocol):
     request_s = 2.0
     stalled_s = 2.0
+
+
+class EndlessDeadlines(GuardedProtocol):
+    stalled_s = PATIENCE_S
 
 
 def _connected(port: int, *sent: bytes) -> socket.socket:
@@ -73,24 +76,23 @@ def test_the_server_stops_in_time_with_a_stuck_stream() -> None:
     client.close()
 
 
-def test_a_client_that_stops_reading_is_disconnected_and_does_not_delay_others() -> None:
+@pytest.mark.parametrize("guard", [EndlessDeadlines, ShortDeadlines])
+def test_a_client_that_stops_reading_does_not_delay_others_and_is_disconnected_in_the_end(
+    guard: type[GuardedProtocol],
+) -> None:
     bench = make_api_bench()
     names = [f"tag-{number}" for number in range(2000)]
     bench.move(*names)
-    with serving(bench, ShortDeadlines) as port, streaming(port) as events:
+    with serving(bench, guard) as port, streaming(port) as events:
         next(events)
-        stuck = _connected(port, b"GET /api/v1/stream?max_hz=30 HTTP/1.1\r\nhost: x\r\n\r\n")
-        gaps_s, end_s = [], time.monotonic() + 3.0
-        while time.monotonic() < end_s:
-            bench.move(*names)
-            start_s = time.monotonic()
-            next(events)
-            gaps_s.append(time.monotonic() - start_s)
-        assert statistics.median(gaps_s) < 2.0
-        with closing(stuck):
-            received = stuck.recv(2**26, socket.MSG_WAITALL)
-            assert received.startswith(b"HTTP/1.1 200")
-            assert _ended(stuck)
+        with closing(_connected(port, b"GET /api/v1/stream?max_hz=30 HTTP/1.1\r\nhost: x\r\n\r\n")) as stuck:
+            for _ in range(15):
+                bench.move(*names)
+                next(events)
+            if guard is ShortDeadlines:
+                received = stuck.recv(2**26, socket.MSG_WAITALL)
+                assert received.startswith(b"HTTP/1.1 200")
+                assert _ended(stuck)
 
 
 @pytest.mark.parametrize(
@@ -145,9 +147,9 @@ def test_a_slow_but_complete_request_and_a_long_stream_are_served() -> None:
 def test_a_large_body_may_take_longer_than_the_deadline_while_it_comes_fast_enough() -> None:
     piece, pieces = b"\0" * 300_000, 5
     head = f"POST /api/v1/plan-images HTTP/1.1\r\nhost: x\r\ncontent-length: {pieces * len(piece)}\r\n\r\n"
-    with serving(make_api_bench(), ShortDeadlines) as port, closing(_connected(port, head.encode())) as client:
+    with serving(make_api_bench(), LongDeadlines) as port, closing(_connected(port, head.encode())) as client:
         for _ in range(pieces):
-            time.sleep(0.4 * ShortDeadlines.request_s)
+            time.sleep(0.3 * LongDeadlines.request_s)
             client.sendall(piece)
         assert _answer(client).startswith(b"HTTP/1.1 422")
 
