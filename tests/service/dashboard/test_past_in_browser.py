@@ -41,6 +41,11 @@ def test_a_link_leads_to_a_moment_of_the_past_and_back_to_the_present(
         place.move("first", x=-4.0)  # the present goes on, but the past does not show it
         page.page.wait_for_timeout(600)
         assert page.tags()["first"]["x"] == pytest.approx(30.5, abs=0.01)
+        page.page.goto(link_to(place, end_ns, 155, tag="second"))
+        lane = page.page.locator("#lane")
+        expect(lane).to_contain_text(re.compile(r"Tracked 9\d %, at no known place \d %"))
+        expect(lane).to_contain_text("0 stops of a minute or more")
+        expect(lane.locator("path[data-state='lost']")).to_have_count(1)
         page.page.goto(link_to(place, end_ns, 155, tag="first"))
         page.wait_for("dropanchor.tags()[0]?.x > 150")
         assert {tag: known["state"] for tag, known in page.tags().items()} == {

@@ -1,6 +1,7 @@
 /** Periods of the past by name, in the time of the browser. */
 
 export const HOUR_MS = 3_600_000;
+const MOMENT_MS = 5000;
 export const LONGEST_MS = 31 * 24 * HOUR_MS;
 
 /** @typedef {{from_ms: number, to_ms: number}} Period */
@@ -37,6 +38,16 @@ export function gapAt(stretches, { from_ms, to_ms }, time_ms) {
   const before = next < 0 ? stretches.at(-1) : stretches[next - 1];
   return { from_ms: Math.max(from_ms, before?.to_ms ?? from_ms), to_ms: Math.min(to_ms, next < 0 ? to_ms : stretches[next].from_ms) };
 }
+
+/** Return the end of the pause that holds a time: of a gap, or of a stop; the time itself where there is none. A moment is left at both ends.
+ * @param {readonly Period[]} pauses @param {number} time_ms */
+export function afterPause(pauses, time_ms) {
+  const pause = pauses.find(({ from_ms, to_ms }) => time_ms > from_ms + MOMENT_MS && time_ms < to_ms - MOMENT_MS);
+  return pause ? pause.to_ms - MOMENT_MS : time_ms;
+}
+
+/** Return the times without poses between others. @param {readonly Period[]} stretches with poses, in order */
+export const gapsBetween = (stretches) => stretches.slice(1).map(({ from_ms }, i) => ({ from_ms: stretches[i].to_ms, to_ms: from_ms }));
 
 /** Return the path of a strip that is 1000 long and 1 high, filled where there are poses. @param {readonly Period[]} stretches @param {Period} period */
 export function stripPath(stretches, { from_ms, to_ms }) {

@@ -4,7 +4,7 @@ import { NO_TRACKS } from "./tracks.js";
 import { readTracks } from "./track_reader.js";
 import { t } from "../i18n/language.js";
 
-export const SPEEDS = [0.5, 1, 2, 5, 10, 20, 50];
+export const SPEEDS = [0.5, 1, 2, 5, 10, 20, 50, 200];
 /** Tags times seconds of a piece, and of the time before it. The service reads twice as many pose by pose. */
 const PIECE_POSES = 100_000;
 const [SHORTEST_MS, LONGEST_MS] = [10_000, 600_000];
@@ -28,6 +28,8 @@ export class Replay extends EventTarget {
   problem = "";
   /** Whether the figures of the period have arrived. */
   isLoaded = false;
+  /** Return the end of the pause at a time, if nothing worth seeing happens then and a person wants to skip that; the time itself otherwise. */
+  afterPause = (/** @type {number} */ time_ms) => time_ms;
   #speed = 1;
   /** Figures and thinned points of every tag over the whole period. */
   figures = NO_TRACKS;
@@ -86,7 +88,7 @@ export class Replay extends EventTarget {
    * @param {number} elapsed_ms */
   advance(elapsed_ms) {
     if (!this.playing || this.loading) return;
-    const next_ms = Math.min(this.to_ms, this.time_ms + elapsed_ms * this.#speed);
+    const next_ms = Math.min(this.to_ms, this.afterPause(this.time_ms + elapsed_ms * this.#speed));
     if (this.#pieceAt(this.time_ms) && !this.#pieceAt(next_ms)) return void this.#load(next_ms);
     this.seek(next_ms);
     this.#load(next_ms + AHEAD * this.#pieceLength);

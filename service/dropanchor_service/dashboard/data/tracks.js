@@ -54,6 +54,7 @@ export class Track {
     this.y = part(all.number.y);
     this.z = part(all.number.z);
     this.z_std_m = part(all.number.z_std_m);
+    this.speed_mps = part(all.number.speed_mps);
     /** What is known since the previous point: TRACKING, DOUBTFUL or UNKNOWN. */
     this.since = part(all.since);
     /** How far stored poses since the previous point are from the line, at most, m; NaN: unknown. */

@@ -9,7 +9,8 @@ import { PastBar } from "../panel/past_bar.js";
 import { PastFigures } from "../panel/past_figures.js";
 import { PastTrails } from "../data/past_trails.js";
 import { ChosenTracks } from "../data/chosen_tracks.js";
-import { HOUR_MS, lastHour } from "../data/periods.js";
+import { HOUR_MS, afterPause, gapsBetween, lastHour } from "../data/periods.js";
+import { Lane } from "../panel/lane.js";
 import { Replay } from "../data/replay.js";
 import { StoredTimes } from "../data/stored_times.js";
 import { readTracks } from "../data/track_reader.js";
@@ -53,6 +54,8 @@ export class Past {
   constructor(page) {
     this.page = page;
     this.bar = new PastBar(/** @type {HTMLFormElement} */ (page.byId("past")), this.replay, this.#times);
+    this.lane = new Lane(page.byId("lane"), this.replay);
+    this.replay.afterPause = (time_ms) => (this.bar.skips ? afterPause([...gapsBetween(this.#times.stretches ?? []), ...this.lane.stops], time_ms) : time_ms);
     this.figures = new PastFigures(page.byId("past-figures"), this.replay, page.choice);
     this.heat = new HeatPanel(this.bar.heatButton, page.byId("heat"), page.map, this.replay, page.choice);
     new FiguresPanel(this.bar.figuresButton, /** @type {HTMLDialogElement} */ (page.byId("figures")), this.replay, page.choice, page.fleet, page.panels);
@@ -90,6 +93,7 @@ export class Past {
     const { from_ms, to_ms } = this.replay;
     if (!this.active) this.#tracks.request(this.page.choice.tags);
     else if (from_ms < to_ms) this.#tracks.requestPeriod(this.page.choice.tags, from_ms, to_ms);
+    this.lane.show(this.active ? this.#trackOf(this.page.choice.selected) ?? null : null);
   }
 
   enter() {

@@ -37,6 +37,11 @@ export class PastBar extends EventTarget {
     for (const name of ["time", "state"]) replay.addEventListener(name, () => this.update());
   }
 
+  /** Whether playing leaves out what is not worth seeing. */
+  get skips() {
+    return this.#input("skip").checked;
+  }
+
   /** Offer a period when none was chosen: the last hour. @param {number} end_ms */
   suggest(end_ms) {
     this.#write("from", end_ms - HOUR_MS);

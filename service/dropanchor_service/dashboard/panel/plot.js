@@ -6,6 +6,7 @@ import { multiples, roundStep } from "../map/view.js";
 const SVG = "http://www.w3.org/2000/svg";
 const [LEFT, RIGHT, TOP, BOTTOM] = [34, 8, 6, 5];
 const HEIGHT = 74;
+const STRIP = 4;
 const LINES_PX = 24;
 const SECONDS_PX = 70;
 
@@ -74,6 +75,12 @@ export class Plot {
     if (around.length) this.#path(name, `M${around.map(({ t, value }) => this.#at(t, value)).join("L")}Z`);
   }
 
+  /** Draw a stretch of a strip along the bottom, in the colour of a state. @param {string} state @param {number} from @param {number} to s, at most 0 */
+  strip(state, from, to) {
+    const [left, right] = [this.x(from), Math.max(this.x(to), this.x(from) + 1)];
+    this.#path("strip", `M${left.toFixed(1)} ${HEIGHT - STRIP}H${right.toFixed(1)}V${HEIGHT}H${left.toFixed(1)}Z`).dataset.state = state;
+  }
+
   /** @param {string} name @param {readonly Point[]} points */
   dots(name, points) {
     this.#path(name, points.map(({ t, value }) => `M${this.#at(t, value)}h0`).join(""));
@@ -113,6 +120,7 @@ export class Plot {
     path.setAttribute("class", name);
     path.setAttribute("d", d);
     this.#svg.append(path);
+    return path;
   }
 
   /** @param {string} name @param {string} text @param {number} x @param {number} y @param {string} anchor */
