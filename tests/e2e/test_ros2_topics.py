@@ -139,11 +139,3 @@ def test_of_a_silent_topic_it_is_told_what_is_published_instead_and_when_it_come
         "/mag comes: it is published as sensor_msgs/msg/MagneticField, and sensor_msgs/msg/Range is needed",
         "/uwb comes, although the node driver publishes it: does its sensor give anything?",
     ]
-
-
-def test_a_domain_in_which_nobody_publishes_is_told_with_the_others(router: str) -> None:
-    with connected_session(router) as session:
-        token = announce(session, 6, "imu/data", IMU)
-        with bridge(router, "--domain=5", "--imu=/imu/data") as said:
-            wait_for(said, "no node publishes anything in domain 5, but in domain 6: --domain says which")
-        token.undeclare()

@@ -1,6 +1,7 @@
 """Keys, liveliness tokens and attachments as rmw_zenoh documents them, and zenoh-bridge-ros2dds has them."""
 
 import pytest
+import zenoh
 
 from dropanchor_service.bridges.rmw_zenoh import Announced, Attachment, RmwZenoh, RosType, attachment_from, gid_of
 from dropanchor_service.bridges.ros2dds import Ros2Dds, RosKeys
@@ -28,8 +29,14 @@ def test_keys_and_tokens_have_the_form_of_the_examples_in_the_design_document() 
 def test_the_publisher_of_a_token_is_read_back(keys: RosKeys, domain: str, node: str) -> None:
     token = keys.topic_token("8b20", "driver", 10, "MP", "/imu/data", STRING)
     assert keys.announced_by(token) == Announced(domain, "8b20", node, "/imu/data", "std_msgs/msg/String")
+    assert zenoh.KeyExpr(keys.any_publisher()).includes(zenoh.KeyExpr(token))
     for other in (keys.topic_token("8b20", "driver", 10, "MS", "/imu", STRING), keys.node_token("8b20", "driver"), ""):
         assert keys.announced_by(other) is None
+
+
+def test_publishers_of_other_domains_are_heard_too() -> None:
+    token = RmwZenoh(8).topic_token("8b20", "driver", 10, "MP", "/imu/data", STRING)
+    assert zenoh.KeyExpr(RmwZenoh(7).any_publisher()).includes(zenoh.KeyExpr(token))
 
 
 def test_an_attachment_has_33_bytes() -> None:

@@ -33,6 +33,12 @@ def test_of_many_topics_those_of_the_wanted_type_come_first_and_the_rest_is_coun
     assert told.endswith(" and 11 more")
 
 
+def test_a_domain_in_which_nobody_publishes_is_told_with_the_others() -> None:
+    watch = SilenceWatch({"/imu": IMU}, RmwZenoh(5), "tcp/127.0.0.1:7447", lambda: [publisher("/imu", IMU)], 0.0)
+    (told,) = watch.sentences(SILENT_S)
+    assert told.endswith("no node publishes anything in domain 5, but in domain 0: --domain says which")
+
+
 def test_without_any_node_it_is_told_how_nodes_reach_the_router() -> None:
     (told,) = SilenceWatch({"/imu": IMU}, RmwZenoh(0), "tcp/127.0.0.1:7447", list, 0.0).sentences(SILENT_S)
     assert "no node that publishes is connected to the router tcp/127.0.0.1:7447" in told
