@@ -70,7 +70,9 @@ NOT_RUN = {
     "'dropanchor-service[maps]'": "tests/deploy/test_release.py",
     "install-a-release.md: python3 -m venv ~/dropanchor": "tests/deploy/test_release.py",
     "install-a-release.md: sha256sum --check SHA256SUMS": "tests/deploy/test_release.py",
-    "react-to-events.md: curl http://127.0.0.1:8080/api/v1/alarms": "needs an alarm: tests/service/api/routes/test_zones_and_events.py",
+    "react-to-events.md: curl http://127.0.0.1:8080/api/v1/alarms": (
+        "needs an alarm: tests/service/api/routes/test_zones_and_events.py"
+    ),
     "react-to-events.md: echo whsec_$(openssl rand -base64 32)": "the secret is left to the reader",
     "record-and-replay.md: dropanchor record start": "needs the port 8080: tests/e2e/test_recording.py",
     "record-and-replay.md: dropanchor replay FOLDER_OR_FILE": f"{_FILES}: tests/e2e/test_replay_live_and_offline.py",
