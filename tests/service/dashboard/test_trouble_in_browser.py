@@ -1,5 +1,6 @@
 """What is wrong now is first on the page: found among hundreds of tags, acknowledged, muted, gone when it is over."""
 
+import re
 import time
 
 import pytest
@@ -67,6 +68,11 @@ def test_trouble_is_seen_among_hundreds_of_tags_acknowledged_muted_and_over(chro
         red, green, blue, _ = page.pixel(x + 12, y)
         assert red > 2 * max(green, blue), "a red ring"
         assert violations(page.page, axe) == []
+        page.page.emulate_media(media="print")
+        expect(page.page.locator("#tools")).to_be_hidden()
+        expect(alarms.get_by_role("button", name="Acknowledge: cart-111 entered Press 4")).to_be_hidden()
+        expect(alarms).to_contain_text("cart-111 entered Press 4")
+        page.page.emulate_media(media="screen")
 
         chip.click()
         expect(page.page.locator("#count")).to_have_text("2 of 300 tags")
@@ -126,6 +132,7 @@ def test_events_are_found_by_tag_kind_zone_and_time_are_not_cut_and_are_saved(ch
         form.get_by_label("Type").select_option("A tag leaves a zone")
         expect(lines).to_have_count(70)
         expect(lines.first).to_contain_text("cart-3 left press")
+        expect(lines.first.locator("time")).to_have_attribute("title", re.compile("(UTC|GMT)"))
         place.parts.store.commit([Draft(EventType.ZONE_EXIT, tag, drafts[-1].data) for tag in ("cart-3", "cart-4")], {})
         expect(lines).to_have_count(71)
         with page.page.expect_download() as download:

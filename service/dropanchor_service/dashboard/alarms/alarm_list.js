@@ -5,7 +5,7 @@ import { button, element, keepLines } from "../alerts/lines.js";
 import { age } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { write } from "../page/parts.js";
-import { clock, sentence } from "../zones/words.js";
+import { clock, fullTime, sentence } from "../zones/words.js";
 
 /** @typedef {import("./alarm_store.js").Alarm} Alarm */
 /** @typedef {{pick: (alarm: Alarm) => void, acknowledge: (alarm: Alarm, note: string) => void, mute: (alarm: Alarm, on: boolean) => void}} Acts */
@@ -46,7 +46,7 @@ export class AlarmList {
     const what = button("", "", () => this.acts.pick(alarm));
     what.removeAttribute("aria-label");
     what.className = "what";
-    what.append(element("strong", t(`severity.word_${alarm.severity}`)), element("span", sentence(alarm.event)), element("time", when(alarm)));
+    what.append(element("strong", t(`severity.word_${alarm.severity}`)), element("span", sentence(alarm.event)), Object.assign(element("time", when(alarm)), { title: fullTime(alarm.began_ns / 1e6) }));
     line.append(what);
     line.dataset.severity = alarm.severity;
     line.dataset.wants = String(isPending(alarm));

@@ -1,7 +1,7 @@
 /** The list of the latest events, newest first. A click selects the tag and the zone. */
 
 import { retractedBy } from "./event_log.js";
-import { clock, probability, sentence, why } from "./words.js";
+import { clock, fullTime, probability, sentence, why } from "./words.js";
 import { t } from "../i18n/language.js";
 import { write, writeOrHide } from "../page/parts.js";
 
@@ -60,6 +60,7 @@ export class EventList {
     const button = element("button", "");
     const time = /** @type {HTMLTimeElement} */ (element("time", clock(event)));
     time.dateTime = event.time;
+    time.title = fullTime(event.time);
     button.setAttribute("type", "button");
     button.append(element("span", sentence(event)), " ", time, " ", element("small", probability(event)));
     button.addEventListener("click", () => this.pick(event));

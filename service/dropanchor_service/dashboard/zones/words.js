@@ -57,6 +57,9 @@ export function clock({ time }, now = new Date()) {
   return timeText(at, { ...(isToday ? {} : { dateStyle: "medium" }), timeStyle: "medium" });
 }
 
+/** Return a time in full, with its zone: two people who talk of it may be in different ones. @param {string | number} time */
+export const fullTime = (time) => timeText(new Date(time), { dateStyle: "full", timeStyle: "long" });
+
 /** Return what a change did to a zone, as a sentence. @param {Zone | null} before null: it is new @param {Zone | null} after null: it is deleted */
 export function zoneChange(before, after) {
   const { name, id } = /** @type {Zone} */ (after ?? before);
