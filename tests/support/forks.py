@@ -4,6 +4,7 @@ Each program is a process of its own. Only the imports are shared, and nothing o
 inherit the limits of this process.
 """
 
+import atexit
 import functools
 import json
 import os
@@ -94,6 +95,10 @@ class Server:
             program = [sys.executable, "-c", _PROGRAM, str(its.fileno())]
             self._process = subprocess.Popen(program, pass_fds=[its.fileno()], env=environment)
 
+    def close(self) -> None:
+        self._socket.close()
+        self._process.wait()
+
     def start(self, words: Sequence[str], environment: dict[str, str]) -> Forked:
         """Run `dropanchor` with these words. Its stdout is that of this process."""
         reading, writing = os.pipe()
@@ -114,7 +119,9 @@ def read_at_import(environment: dict[str, str]) -> dict[str, str]:
 
 @functools.cache
 def _server() -> Server:
-    return Server(environment())
+    server = Server(environment())
+    atexit.register(server.close)
+    return server
 
 
 def can_be_forked() -> bool:
