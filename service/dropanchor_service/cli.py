@@ -26,6 +26,7 @@ _COMMANDS = {
     "serve": "run the service",
     "check": "check the settings, credentials, folders and ports of a service without starting it",
     "status": "show how a running service and its tags do",
+    "doctor": "find out what is wrong with a running service, or with one of its tags",
     "router": "run a separate Zenoh router",
     "api": "run an API node of a cluster: the page and REST of all its sites",
     "cluster": "run sites on several machines: start, show, move, drain",

@@ -37,7 +37,14 @@ BY_OTHERS = {
 CREDENTIALS = ("connect-a-phone.md", "secure-a-site.md", "serve-several-sites.md")
 """Pages of which the lines are run that make credentials."""
 _STAYS, _FILES, _PIP = "runs until it is stopped", "needs files of the reader", "installs a package"
+_PAST = "asks for a time at which a black box was there: tests/e2e/test_past.py"
 NOT_RUN = {
+    "a-tag-is-wrong.md: dropanchor doctor": "needs the port 8080: tests/service/commands/test_doctor.py",
+    "a-tag-is-wrong.md: curl -s 'http://127.0.0.1:8080/api/v1/tags/forklift-7/samples?from=2026-01-30T14:58:00Z"
+    "&to=2026-01-30T15:00:00Z&anonymous=true' > minutes.mcap": _PAST,
+    "explain-a-pose.md: curl -s 'http://127.0.0.1:8080/api/v1/tags/forklift-7/explain?at=2026-01-30T15:00:00Z'": _PAST,
+    "explain-a-pose.md: curl -s http://127.0.0.1:8080/api/v1/tags/forklift-7/what-if "
+    "-H 'content-type: application/json' \\": _PAST,
     "tutorial.md: make demo": f"{_STAYS}: tests/e2e/test_demo.py",
     "tutorial.md: .venv/bin/dropanchor serve --data-dir data": f"{_STAYS}: tests/e2e/test_start_and_stop.py",
     "change-the-code.md: .venv/bin/python -m dropanchor_schemas.export": "writes into the repository",

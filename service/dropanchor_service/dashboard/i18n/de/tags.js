@@ -101,6 +101,7 @@ export default {
   "tag.rejected": "Nicht verwendet",
   "tag.rejected_label": "Nicht verwendete Messwerte und Nachrichten, nach Grund",
   "tag.json": "Diese Pose als JSON",
+  "tag.wrong": "Ist dieser Tag am falschen Ort?",
   "tag.add_anchor": "Anker {id} hinzufügen",
   "health.title": "Was das Tag über sich meldet",
   "health.battery": "Batterie",

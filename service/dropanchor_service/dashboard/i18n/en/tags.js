@@ -101,6 +101,7 @@ export default {
   "tag.rejected": "Not used",
   "tag.rejected_label": "Samples and messages not used, by reason",
   "tag.json": "This pose as JSON",
+  "tag.wrong": "Is this tag wrong?",
   "tag.add_anchor": "Add anchor {id}",
   "health.title": "What the tag reports about itself",
   "health.battery": "Battery",

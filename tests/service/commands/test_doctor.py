@@ -1,0 +1,40 @@
+"""`dropanchor doctor` finds what is wrong with a tag, now and at a time that is past, and its exit code says so."""
+
+import subprocess
+import time
+from pathlib import Path
+
+from dropanchor_schemas.wire import ENCODING_JSON
+from support.commands import Ended
+from support.service import command, environment
+from support.yard import running_yard
+from support.zenoh_router import free_port, wait_until
+
+TAG = "forklift-7"
+
+
+def doctor(url: str, *options: str) -> Ended:
+    words = command("doctor", "--url", url, *options)
+    done = subprocess.run(words, env=environment(), capture_output=True, text=True, check=False)
+    return Ended(done.returncode, done.stdout, done.stderr)
+
+
+def test_a_rejection_a_change_of_settings_and_silence_are_found_with_their_times(tmp_path: Path) -> None:
+    with running_yard(tmp_path, TAG) as yard:
+        assert doctor(yard.url) == Ended(0, "good  service: it is ready\n", "")
+        junk = b'{"range": [{"t_ns": %d, "anchor": 7, "range_m": -1.0}]}' % time.time_ns()
+        yard.ask("POST", f"/api/v1/ingest/samples?tag={TAG}", content=junk, headers={"content-type": ENCODING_JSON})
+        wait_until(lambda: yard.get(f"/api/v1/tags/{TAG}")["rejected"])
+        yard.put(f"/api/v1/tags/{TAG}/settings", {"mount_angle_rad": 1.5})
+        found = doctor(yard.url, "--tag", TAG)
+        assert found.returncode == 1, found.stderr
+        lines = found.stdout.splitlines()
+        for begin, end in (
+            ("LOOK  tag, sensors: 1 x range_negative at 20", "below zero"),
+            ("LOOK  settings: 20", "mount_angle_rad None → 1.5"),
+            ("good  service: its clock is ", " s from that of this machine"),
+        ):
+            assert [line for line in lines if line.startswith(begin) and end in line], found.stdout
+        assert doctor(yard.url, "--tag", "nobody").returncode == 2
+        assert "black box holds nothing" in doctor(yard.url, "--tag", TAG, "--at", "2020-01-01T00:00:00Z").stderr
+    assert doctor(f"http://127.0.0.1:{free_port()}").returncode == 2
