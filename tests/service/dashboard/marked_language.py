@@ -30,7 +30,7 @@ TEXTS = """() => {
         if (!parentElement.closest("code, kbd, script, time, [lang]:not(html)")) texts.push(data);
     }
     for (const name of ["aria-label", "title", "placeholder", "alt"]) {
-        for (const element of document.querySelectorAll(`[${name}]`)) texts.push(element.getAttribute(name));
+        for (const element of document.querySelectorAll(`[${name}]:not(time)`)) texts.push(element.getAttribute(name));
     }
     return [...texts, ...window.written];
 }"""

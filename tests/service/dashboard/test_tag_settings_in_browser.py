@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Locator, Route, expect
 
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.api.app import DASHBOARD
-from dropanchor_service.estimation.columns import State
+from dropanchor_service.estimation.columns import State, StateReason
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
 from service.dashboard.place import Place, live_api_bench
@@ -139,7 +139,7 @@ def test_the_tag_is_here_sets_its_start_by_a_drag_or_by_numbers(chromium: Browse
         assert [start.y, start.heading_rad] == pytest.approx([1.0, -math.pi / 2], abs=0.03)
         assert start.x > 1.2
         expect(form).to_be_hidden()
-        place.move("cart", x=1.0, y=1.0, state=State.LOST)  # what came of it
+        place.move("cart", x=1.0, y=1.0, state=State.LOST, reason=StateReason.RANGES_MISSING)  # it came of that
         expect(page.page.locator("#detail [data-part='hint']")).to_contain_text(re.compile("^You said .* ago where"))
         page.page.get_by_role("button", name="The tag is here…").click()
         form.get_by_label("x").fill("2")

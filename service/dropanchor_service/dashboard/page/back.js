@@ -11,6 +11,8 @@ const ORDER = [
 
 export class Back {
   #isAbove = false;
+  /** Whether this page itself goes back, because nothing is open. What is opened meanwhile stays. */
+  #isLeaving = false;
   /** The address that the browser went back to, and that is not to be read. */
   #left = "";
 
@@ -24,8 +26,9 @@ export class Back {
   /** Add the entry once something is open, and take it away when nothing is. */
   update() {
     const isOpen = this.#open !== undefined;
-    if (isOpen === this.#isAbove) return;
+    if (this.#isLeaving || isOpen === this.#isAbove) return;
     this.#isAbove = isOpen;
+    this.#isLeaving = !isOpen;
     if (!isOpen) return history.back();
     history.replaceState({ is: "below" }, "");
     history.pushState({ is: "above" }, "");
@@ -39,10 +42,11 @@ export class Back {
 
   /** @param {{is?: string} | null} state of the entry that the browser went to */
   #went(state) {
-    this.#isAbove = state?.is === "above";
+    const isOwn = this.#isLeaving;
+    [this.#isLeaving, this.#isAbove] = [false, state?.is === "above"];
     this.#left = state?.is === "below" ? location.href : "";
     if (this.#left === "") return;
     keepAddress();
-    if (this.#open) this.panels.close(this.#open);
+    if (this.#open && !isOwn) this.panels.close(this.#open);
   }
 }

@@ -32,6 +32,7 @@ NO_CHANGE = {
     **dict.fromkeys(("ingest_samples", "ingest_sensor_logger", "ingest_phyphox", "ingest_health"), "data of tags"),
     **dict.fromkeys(("start_recording", "stop_recording"), "no setting, and it must stop with a full disk"),
     **dict.fromkeys(("retry_dead_letters", "delete_dead_letters"), "events that wait are no settings"),
+    "run_again": "it changes nothing",
     "start_simulated_tags": "the start of each tag leaves an entry",
     **dict.fromkeys(("stop_simulated_tags", "make_qr_code"), "no setting"),
     "test_destination": "it sends an event and changes nothing",
