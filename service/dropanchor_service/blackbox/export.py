@@ -12,6 +12,7 @@ from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.blackbox.chosen import BoxError, chosen, turns_of
+from dropanchor_service.blackbox.pieces import pieces_in
 from dropanchor_service.checkpoints.format import CheckpointError
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.decode import decode
@@ -36,6 +37,9 @@ class Sent:
     """
 
     def __init__(self, folder: Path, site: str, tag: str, from_ns: int, to_ns: int, anonymous: bool) -> None:
+        oldest = next(iter(pieces_in(folder)), None)
+        if oldest is not None and oldest.from_ns <= to_ns:
+            from_ns = max(from_ns, oldest.from_ns)  # what is left of the period
         pieces = chosen(folder, from_ns, to_ns, lead_ns=0)
         try:
             head = pieces[0].head()

@@ -6,6 +6,7 @@ import { FiguresPanel } from "../panel/figures_panel.js";
 import { HeatPanel } from "../panel/heat_panel.js";
 import { heightsOfTrack } from "../panel/height_plot.js";
 import { PastBar } from "../panel/past_bar.js";
+import { Then } from "../panel/then.js";
 import { PastFigures } from "../panel/past_figures.js";
 import { PastTrails } from "../data/past_trails.js";
 import { ChosenTracks } from "../data/chosen_tracks.js";
@@ -57,6 +58,7 @@ export class Past {
     this.lane = new Lane(page.byId("lane"), this.replay);
     this.replay.afterPause = (time_ms) => (this.bar.skips ? afterPause([...gapsBetween(this.#times.stretches ?? []), ...this.lane.stops], time_ms) : time_ms);
     this.figures = new PastFigures(page.byId("past-figures"), this.replay, page.choice);
+    new Then(page.byId("then"), this.replay, page.choice);
     this.heat = new HeatPanel(this.bar.heatButton, page.byId("heat"), page.map, this.replay, page.choice);
     new FiguresPanel(this.bar.figuresButton, /** @type {HTMLDialogElement} */ (page.byId("figures")), this.replay, page.choice, page.fleet, page.panels);
     page.map.trackOf = (tag) => this.#trackOf(tag);
@@ -145,7 +147,7 @@ export class Past {
     if (active) fleet.replace({ t_ns: 0, tags: [] }, 0);
     else fleet.current = false;
     byId("spoken").textContent = t(active ? "past.shows" : "past.shows_present");
-    byId("past-figures").hidden = true;
+    for (const id of ["past-figures", "then"]) byId(id).hidden = true;
     this.became(active);
     this.page.updatePanels();
   }

@@ -32,7 +32,7 @@ export class Lane {
 
   /** @param {Track | null} track */
   show(track) {
-    this.box.hidden = !track || track.time.length < 2;
+    this.box.hidden = !track || track.time.length < 2 || this.replay.to_ms <= this.replay.from_ms; // of a service that has just begun
     if (!track || this.box.hidden) {
       [this.stops, this.#points] = [[], null];
       return;

@@ -1,6 +1,17 @@
 /** Where settings come from, and who changed what. */
 
 export default {
+  "then.title": "Warum er da war",
+  "then.explain": "Erklären",
+  "then.samples": "Die Rohdaten der zwei Minuten davor speichern",
+  "then.lines": "Was davor geschah",
+  "then.running": "Die Engine rechnet diese Minuten noch einmal; das dauert einige Sekunden.",
+  "then.rejected": "{time}: {n} nicht verwendet ({reason})",
+  "then.clock_jump": "{time}: Die Uhr des Tags wurde gestellt",
+  "then.restart": "{time}: Der Tag begann von vorn",
+  "then.missing": "{time}: {n} Nachrichten kamen nie an",
+  "then.state": "{time}: {state}",
+  "then.change": "{time}: {who} änderte {item}: {what}",
   "trail.title": "Einstellungen und Änderungen",
   "trail.values": "Woher Werte kommen",
   "trail.values_what": "Was hier gesetzt wurde, gilt Wert für Wert vor den Einstellungen des Dienstes. Was Sie zurückgeben, folgt ihnen wieder.",

@@ -1,6 +1,17 @@
 /** Where settings come from, and who changed what. */
 
 export default {
+  "then.title": "Why it was there at this time",
+  "then.explain": "Explain",
+  "then.samples": "Save the raw samples of the two minutes before",
+  "then.lines": "What happened before",
+  "then.running": "The engine runs these minutes again; that takes some seconds.",
+  "then.rejected": "{time}: {n} not used ({reason})",
+  "then.clock_jump": "{time}: the clock of the tag was set",
+  "then.restart": "{time}: the tag started again",
+  "then.missing": "{time}: {n} messages never came",
+  "then.state": "{time}: {state}",
+  "then.change": "{time}: {who} changed {item}: {what}",
   "trail.title": "Settings and changes",
   "trail.values": "Where values come from",
   "trail.values_what": "What was set here wins over the settings of the service, value by value. What you give back follows them again.",
