@@ -34,6 +34,9 @@ BEYOND_THE_SCHEMA = {
     "list_changes": [positive_data_acceptance],
     "get_changes_file": [positive_data_acceptance],
     "get_tracks": [positive_data_acceptance],
+    "get_samples": [positive_data_acceptance],
+    "explain_pose": [positive_data_acceptance],
+    "run_again": [positive_data_acceptance],
     "export_track": [positive_data_acceptance],
     "patch_remote_settings": [positive_data_acceptance],
     "put_anchor": [positive_data_acceptance],
@@ -60,10 +63,11 @@ BEYOND_THE_SCHEMA = {
     "ingest_samples": [positive_data_acceptance],
     "ingest_sensor_logger": [positive_data_acceptance, negative_data_rejection],
 }
-"""Rules that a schema cannot express: a tile lies within its zoom level; `from` and `to` are at most 31 days apart;
-a time is not in seconds; each anchor is listed once; without credentials a request names the tag; a message holds a
-sample or a value; `If-Match` is the current tag of a resource; edges do not cross; an image is one, and was uploaded;
-a URL is public and a secret long; share links need access control. And that Sensor Logger's 499 is a refusal."""
+"""Rules that a schema cannot express: a tile lies within its zoom level; `from` and `to` are at most 31 days
+apart, or an hour or half of one; a time is not in seconds; each anchor is listed once; without credentials a
+request names the tag; a message holds a sample or a value; `If-Match` is the current tag of a resource; edges do
+not cross; an image is one, and was uploaded; a URL is public and a secret long; share links need access control.
+And that Sensor Logger's 499 is a refusal."""
 
 IDS = st.text(st.characters(exclude_categories=["C", "Z"], include_characters=" "), min_size=1, max_size=64)
 IDS = IDS.filter(lambda one: one.isprintable() and one not in NOT_IDS)

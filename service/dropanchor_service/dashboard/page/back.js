@@ -3,6 +3,7 @@
  * While anything is open, the history has one entry more. It has the same address, so that no link changes. */
 
 import { keepAddress } from "../data/address.js";
+import { isKiosk } from "./kiosk.js";
 
 /** What *Back* closes first. @type {readonly import("./one_panel.js").PanelName[]} */
 const ORDER = [
@@ -26,7 +27,7 @@ export class Back {
   /** Add the entry once something is open, and take it away when nothing is. */
   update() {
     const isOpen = this.#open !== undefined;
-    if (this.#isLeaving || isOpen === this.#isAbove) return;
+    if (isKiosk || this.#isLeaving || isOpen === this.#isAbove) return; // nobody opens anything on a wall
     this.#isAbove = isOpen;
     this.#isLeaving = !isOpen;
     if (!isOpen) return history.back();
