@@ -56,16 +56,19 @@ class Piece:
     session: str
 
     def records(self, *kinds: bytes, from_ns: int = 0, to_ns: int = 2**62) -> Iterator[tuple[bytes, bytes]]:
-        """Yield kind and content of the whole records of these kinds that touch a time. Raises OSError."""
+        """Yield kind and content of the whole records of these kinds that touch a time.
+
+        Raises OSError, and CheckpointError where the file is cut or no record follows.
+        """
         with open_below(self.path.parent, self.path.name) as file:
             while len(prefix := file.read(_PREFIX.size)) == _PREFIX.size:
                 kind, length, first_ns, last_ns = _PREFIX.unpack(prefix)
                 if length > MAX_RECORD or kind not in (HEAD, STATE, TURNS):
-                    return
+                    raise CheckpointError("it is damaged")
                 if kind in kinds and (kind != TURNS or (last_ns >= from_ns and first_ns <= to_ns)):
                     content = file.read(length)
                     if len(content) < length:
-                        return
+                        raise CheckpointError("it is cut")
                     yield kind, content
                 else:
                     file.seek(length, os.SEEK_CUR)
@@ -80,7 +83,8 @@ class Piece:
 
     def checkpoint(self) -> tuple[str, Snapshot] | None:
         """Return the layout and the snapshot of the checkpoint, None where the engine keeps no state. See `head`."""
-        return next((decoded(content) for _, content in self.records(STATE)), None)
+        kind, content = next(self.records(STATE, TURNS), (TURNS, b""))
+        return decoded(content) if kind == STATE else None
 
     def size(self) -> int:
         with suppress(OSError):
