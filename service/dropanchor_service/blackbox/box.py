@@ -2,6 +2,7 @@
 
 import errno
 import logging
+import math
 import secrets
 import time
 from collections import deque
@@ -24,13 +25,20 @@ MAX_QUEUED_BYTES = 64 * 2**20
 MESSAGE_OVERHEAD = 150  # bytes of a queued message beside its payload
 PIECE_S, LONGEST_PIECE_S = 60.0, 900.0
 STATE_SHARE = 0.25  # of what a piece takes: longer pieces where many tags have large checkpoints
-PATIENT_S = 10.0  # a checkpoint waits so long for a moment at which no message waits for another one
+PATIENT_S = 10.0  # a checkpoint waits so long for a moment at which no message waits for another one, and after a loss
 
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class _Begin:
+@dataclass(frozen=True, kw_only=True)
+class _Sync:
+    """is_done: set when all that was queued before is written, or lost."""
+
+    is_done: Event = field(default_factory=Event)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Begin(_Sync):
     """A new piece begins before the next turn. snapshot: None with an engine that keeps no state."""
 
     t_ns: int
@@ -38,13 +46,6 @@ class _Begin:
     head: Head
     layout: str
     snapshot: Snapshot | None
-
-
-@dataclass(frozen=True)
-class _Sync:
-    """is_done: set when all that was queued before is written."""
-
-    is_done: Event = field(default_factory=Event)
 
 
 class BlackBox:
@@ -62,6 +63,7 @@ class BlackBox:
         now_ns: Callable[[], int],
         metadata: Mapping[str, str],
         clock: Callable[[], float] = time.monotonic,
+        max_queued_bytes: int = MAX_QUEUED_BYTES,
     ) -> None:
         self.folder = folder
         self._limits = limits
@@ -74,13 +76,15 @@ class BlackBox:
         for site in sites:
             site.store.on_change(partial(self._changed.append, site.index))
         self._began_s: float | None = None  # the last piece; None: a new one is to begin
+        self._tried_s = -math.inf
+        self._begin: _Begin | None = None  # the last one: at most one waits for the disk, whatever its size
         self._messages = self._of_piece = 0
         self._dropped = 0
         self._piece: OpenPiece | None = None  # of the writing thread, as the next ones
         self._state_bytes = 0
         self._failed: str | None = None
-        self.writer: BackgroundWriter[BoxTurn | _Begin | _Sync] = BackgroundWriter(
-            "the black box", self._write, WRITE_S, MAX_QUEUED_BYTES
+        self.writer: BackgroundWriter[BoxTurn | _Sync] = BackgroundWriter(
+            "the black box", self._write, WRITE_S, max_queued_bytes
         )
 
     def __enter__(self) -> Self:
@@ -99,8 +103,8 @@ class BlackBox:
         return self._failed or self.writer.problem
 
     def on_messages(self, messages: Messages) -> None:
-        """Keep the messages of a turn."""
-        if self._began_s is None:
+        """Keep the messages of a turn, unless some before it were lost."""
+        if self._is_broken:
             return
         documents = {}
         while self._changed:
@@ -123,12 +127,19 @@ class BlackBox:
         has_pending: whether a message waits for one numbered before it: a checkpoint holds none of them.
         """
         if self._is_due(has_pending):
-            self._begin()
+            self._begin_piece()
+
+    @property
+    def _is_broken(self) -> bool:
+        """Whether something is missing since the last piece began, or none has begun."""
+        return self._began_s is None or self.writer.dropped != self._dropped
 
     def _is_due(self, has_pending: bool) -> bool:
-        if self._began_s is None or self.writer.dropped != self._dropped:
-            return True
-        old_s = self._clock() - self._began_s
+        if self._begin is not None and not self._begin.is_done.is_set():
+            return False
+        old_s = self._clock() - self._tried_s
+        if self._is_broken:
+            return old_s >= PATIENT_S
         if old_s < PIECE_S or self._messages == self._of_piece:
             return False
         piece = self._piece
@@ -137,18 +148,22 @@ class BlackBox:
             return False
         return not has_pending or old_s > PIECE_S + PATIENT_S
 
-    def _begin(self) -> None:
-        if self._began_s is None or self.writer.dropped != self._dropped:  # something is missing before it
+    def _begin_piece(self) -> None:
+        if self._is_broken:
             self._session = secrets.token_hex(8)
-        self._began_s, self._of_piece, self._dropped = self._clock(), self._messages, self.writer.dropped
+        self._tried_s = self._began_s = self._clock()
+        self._of_piece, self._dropped = self._messages, self.writer.dropped
         self._changed.clear()
         documents = {site.id: site.store.document for site in self._sites}
         defaults = {site.id: site.store.default_settings.model_dump(mode="json") for site in self._sites}
-        snapshot = self._snapshot()
-        size = 0 if snapshot is None else sum(array.nbytes for array in snapshot.arrays.values())
-        layout = "" if self._state is None else self._state.layout
-        head = Head(self._metadata, documents, defaults)
-        self.writer.put(_Begin(self._now_ns(), self._session, head, layout, snapshot), size)
+        self._begin = _Begin(
+            t_ns=self._now_ns(),
+            session=self._session,
+            head=Head(self._metadata, documents, defaults),
+            layout="" if self._state is None else self._state.layout,
+            snapshot=self._snapshot(),
+        )
+        self.writer.put(self._begin, 0)
 
     def _snapshot(self) -> Snapshot | None:
         """Return a copy of the state in memory that no other snapshot uses."""
@@ -159,7 +174,7 @@ class BlackBox:
         self._state.keep_buffers_apart()
         return found
 
-    def _write(self, items: Sequence[BoxTurn | _Begin | _Sync]) -> None:
+    def _write(self, items: Sequence[BoxTurn | _Sync]) -> None:
         """Write the items. What the disk does not take is lost, and a new piece begins: a run must not skip anything.
 
         Old pieces make room first.
@@ -171,21 +186,21 @@ class BlackBox:
                 self._failed = None
         except OSError as error:
             self._give_up(error.strerror or str(error))
+        finally:
+            for item in items:
+                if isinstance(item, _Sync):
+                    item.is_done.set()
 
-    def _add(self, items: Sequence[BoxTurn | _Begin | _Sync]) -> None:
-        turns, synced = list[BoxTurn](), list[_Sync]()
+    def _add(self, items: Sequence[BoxTurn | _Sync]) -> None:
+        turns = list[BoxTurn]()
         for item in items:
             if isinstance(item, BoxTurn):
                 turns.append(item)
-            elif isinstance(item, _Sync):
-                synced.append(item)
-            else:
+            elif isinstance(item, _Begin):
                 self._add_turns(turns)
                 turns = []
                 self._open(item)
         self._add_turns(turns)
-        for sync in synced:
-            sync.is_done.set()
 
     def _open(self, begin: _Begin) -> None:
         self._close()

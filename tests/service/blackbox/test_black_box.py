@@ -14,10 +14,10 @@ from dropanchor_schemas.past import WhatIf
 from dropanchor_schemas.site import Anchor
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, RangeSample, encode_json
 from dropanchor_service.blackbox.block import Block, BoxTurn, encoded_turns
-from dropanchor_service.blackbox.box import BlackBox
+from dropanchor_service.blackbox.box import MAX_QUEUED_BYTES, PATIENT_S, BlackBox
 from dropanchor_service.blackbox.chosen import BoxError
 from dropanchor_service.blackbox.export import NOBODY, Sent
-from dropanchor_service.blackbox.pieces import Limits, Piece, pieces_in
+from dropanchor_service.blackbox.pieces import TURNS, Limits, Piece, pieces_in
 from dropanchor_service.blackbox.questions import Question, answer_to
 from dropanchor_service.blackbox.rerun import Rerun
 from dropanchor_service.engines.choose import create_engine
@@ -39,7 +39,7 @@ RENAMED_NS, MOVED_NS, END_NS = T0_NS + 66 * S, T0_NS + 70 * S, T0_NS + 75 * S
 class Boxed:
     """An ingest with a real engine and a black box, whose writing thread is `write`. now_ns: the time."""
 
-    def __init__(self, folder: Path, tags: int = 0, limits: Limits = LIMITS) -> None:
+    def __init__(self, folder: Path, tags: int = 0, limits: Limits = LIMITS, queued: int = MAX_QUEUED_BYTES) -> None:
         self.clock = ManualClock()
         options: dict[str, Any] = {"site": {"anchors": [{"id": "1"}]}, "tags": known_starts(tags, 1) if tags else {}}
         settings = load_settings(options=options, environment={})
@@ -49,7 +49,8 @@ class Boxed:
         self.bench = IngestBench(engine=engine, clock=self.clock, observers=observers, **options)
         state = self.bench.service_state() if tags else None
         now_ns = self.clock.now_ns
-        self.box = BlackBox(folder, limits, self.bench.sites, state, now_ns, settings.of_replays, clock=self.monotonic)
+        metadata, clock = settings.of_replays, self.monotonic
+        self.box = BlackBox(folder, limits, self.bench.sites, state, now_ns, metadata, clock, queued)
         self.box.between_turns(has_pending=False)
 
     def monotonic(self) -> float:
@@ -201,6 +202,18 @@ def test_what_damage_leaves_of_a_piece_is_used_up_to_there(tmp_path: Path, damag
     assert len(sent_in(boxed)) == 2
 
 
+@pytest.mark.parametrize("damage", [cut, flip, add_noise])
+def test_no_run_goes_on_after_a_piece_that_is_damaged(tmp_path: Path, damage: Callable[[Path], None]) -> None:
+    boxed = Boxed(tmp_path)
+    for _ in range(3):
+        boxed.send(seconds=30)
+        boxed.write()
+    first, second = pieces_in(tmp_path)
+    assert first.session == second.session
+    damage(first.path)
+    assert sent_in(boxed)[-1] < second.from_ns
+
+
 def sent_in(boxed: Boxed) -> list[int]:
     """Return when the samples of the tag arrived that the box holds."""
     sent = Sent(boxed.box.folder, "default", TAG, T0_NS, boxed.clock.t_ns, False)
@@ -227,12 +240,35 @@ def test_a_disk_that_takes_nothing_costs_its_minutes_alone_and_is_named_meanwhil
         assert "black box cannot be written" in (boxed.box.problem or "")
         boxed.send()
         boxed.write()
-    boxed.send(seconds=2)
+    boxed.send(seconds=round(PATIENT_S) + 2)
     boxed.write()
     assert boxed.box.problem is None
     first, second = pieces_in(tmp_path)
     assert first.session != second.session  # no run passes over what is missing
     assert boxed.bench.rejected() == {}
+
+
+def test_a_state_that_is_larger_than_the_queue_is_copied_once_a_piece(tmp_path: Path) -> None:
+    boxed = Boxed(tmp_path, tags=2, queued=2000)
+    boxed.send(seconds=5)
+    boxed.write()
+    assert boxed.box.writer.dropped == 0
+    (piece,) = pieces_in(tmp_path)
+    assert piece.size() > 2000
+    assert len(sent_in(boxed)) == 5
+
+
+def test_while_the_disk_hangs_one_state_waits_and_after_what_was_lost_a_new_session_begins(tmp_path: Path) -> None:
+    boxed = Boxed(tmp_path, queued=2000)
+    boxed.write()
+    boxed.send(seconds=60)  # nothing is written meanwhile
+    assert boxed.box.writer.dropped == 2  # one turn, and the first after a new beginning: nothing else is tried
+    boxed.write()
+    boxed.send(seconds=2)
+    boxed.write()
+    pieces = pieces_in(tmp_path)
+    assert len({piece.session for piece in pieces}) == len(pieces) == 3  # no run passes over what was lost
+    assert [*pieces[-1].records(TURNS)]
 
 
 def test_the_oldest_pieces_go_when_the_box_is_full_or_they_are_old(tmp_path: Path) -> None:
