@@ -11,7 +11,8 @@ from dropanchor_schemas.pose import Pose, PoseList
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.answers.answers import Answers, to_json
 from dropanchor_service.answers.columns import REASONS, ellipse_95
-from dropanchor_service.answers.hints import HINTS, RELATIVE_HINT
+from dropanchor_service.answers.hints import RELATIVE_HINT
+from dropanchor_service.answers.reason_hints import HINTS
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, Array, Frame, State, StateReason
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 

@@ -10,7 +10,7 @@ from dropanchor_schemas.pose import StateReason as ReasonName
 from dropanchor_schemas.wire import Frame, HeadingSample, ImuSample, RangeSample
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.answers.columns import REASONS
-from dropanchor_service.answers.hints import HINTS
+from dropanchor_service.answers.reason_hints import HINTS
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
 from support.ingest import IngestBench
 

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from dropanchor_schemas.rejections import Reason
 from dropanchor_schemas.sentences import Sentence, phrase_of, said_by, say, with_stop
 from dropanchor_schemas.zones import Circle, Polygon
-from dropanchor_service.answers import hints, unused
+from dropanchor_service.answers import hints, reason_hints, unused
 from dropanchor_service.answers.care import care_of, wrong_clock
 from dropanchor_service.answers.columns import REASONS
 from dropanchor_service.api.http.closing import reason_of
@@ -45,7 +45,7 @@ from support.sentences import PREFIX, about_sensors, calls, in_words, messages, 
 
 
 def hints_of_poses() -> Iterator[str]:
-    yield from filter(None, hints.HINTS)
+    yield from filter(None, reason_hints.HINTS)
     yield hints.RELATIVE_HINT
     yield from (
         hints.MOUNT_UNKNOWN,

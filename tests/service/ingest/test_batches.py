@@ -10,7 +10,8 @@ import pytest
 
 from dropanchor_schemas.wire import Frame, decode_packed
 from dropanchor_service.answers.answers import Answers
-from dropanchor_service.answers.hints import FORWARD_UNKNOWN, HINTS, RELATIVE_HINT
+from dropanchor_service.answers.hints import FORWARD_UNKNOWN, RELATIVE_HINT
+from dropanchor_service.answers.reason_hints import HINTS
 from dropanchor_service.estimation.columns import ANCHOR, IMU, RANGE, Array, SampleBatch, StateReason, default_settings
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.fleet.frontend.sorting import MAX_WAITING

@@ -9,7 +9,6 @@ from dropanchor_service.answers.hints import (
     FORWARD_IMU,
     FORWARD_RANGES,
     FORWARD_UNKNOWN,
-    HINTS,
     MOTION_COMES,
     MOUNT_UNKNOWN,
     RANGES_COME,
@@ -21,6 +20,7 @@ from dropanchor_service.answers.hints import (
     late,
     needs_both,
 )
+from dropanchor_service.answers.reason_hints import HINTS
 from dropanchor_service.answers.unused import WHY, behind, not_used
 from dropanchor_service.estimation.plausibility.verdicts import SENTENCES
 from dropanchor_service.store.rows import MESSAGE
