@@ -18,8 +18,10 @@ from dropanchor_service.blackbox.pieces import Head, Limits, OpenPiece, drop_old
 from dropanchor_service.checkpoints.format import Snapshot
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.runtime.background_writer import BackgroundWriter
+from dropanchor_service.runtime.helper_process import HelperProcess
 from dropanchor_service.store import Sites
 
+RUN_S = 60.0  # that a question may take
 WRITE_S = 10.0  # so much of it a kill can lose
 MAX_QUEUED_BYTES = 64 * 2**20
 MESSAGE_OVERHEAD = 150  # bytes of a queued message beside its payload
@@ -66,6 +68,7 @@ class BlackBox:
         max_queued_bytes: int = MAX_QUEUED_BYTES,
     ) -> None:
         self.folder = folder
+        self.runs = HelperProcess("dropanchor_service.blackbox", RUN_S, "running the past again")
         self._limits = limits
         self._sites = sites
         self._state = state

@@ -25,12 +25,9 @@ from dropanchor_service.blackbox.box import BlackBox
 from dropanchor_service.blackbox.chosen import BoxError
 from dropanchor_service.blackbox.export import Sent
 from dropanchor_service.blackbox.questions import Question
-from dropanchor_service.runtime.helper_process import HelperProcess
 
-TIMEOUT_S = 60.0
 MOST_WAITING = 4  # questions; the estimators come first
 WRITTEN_S = 5.0
-_RUNS = HelperProcess("dropanchor_service.blackbox", TIMEOUT_S, "running the past again")
 OF_THE_BOX = (Kind.NO_BLACK_BOX, Kind.NOT_IN_BLACK_BOX)
 OF_RUNS = (*OF_THE_BOX, Kind.PAST_FAILED, Kind.BUSY)
 
@@ -108,12 +105,12 @@ async def answered(request: Request, tag: str, newest_ns: int, **asked: Any) -> 
     now_ns = answers.now_ns()
     if newest_ns > now_ns:
         raise ProblemError(Kind.NOT_IN_BLACK_BOX, say("box_future", "That time has not come yet."))
-    if _RUNS.waiting >= MOST_WAITING:
+    if box.runs.waiting >= MOST_WAITING:
         raise ProblemError(Kind.BUSY, say("past_busy", "Others look at the past now. Try again in a few seconds."))
     if now_ns - newest_ns < 60e9:
         await run_in_threadpool(box.write_now, WRITTEN_S)
     question = Question(folder=box.folder, site=answers.site.site.id, tag=tag, **asked)
-    output = await _RUNS.answer(question.model_dump_json(exclude_unset=True).encode())
+    output = await box.runs.answer(question.model_dump_json(exclude_unset=True).encode())
     if output is None:
         raise ProblemError(Kind.PAST_FAILED, say("past_failed", "The run failed or took too long; the log says why."))
     found: dict[str, Any] = orjson.loads(output)
