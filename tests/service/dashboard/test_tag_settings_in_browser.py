@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Locator, Route, expect
+from playwright.sync_api import Browser, Locator, Response, Route, expect
 
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.api.app import DASHBOARD
@@ -80,8 +80,9 @@ def test_settings_are_saved_undone_and_merged_with_those_of_another_page(chromiu
 
         for typed, told in (("0", TagSettings(height_told=True)), ("", TagSettings())):
             form.get_by_label("Height").fill(typed)
-            form.get_by_role("button", name="Save settings").click()
-            wait_until(lambda told=told: store.tag_settings("cart") == told)  # type: ignore[misc]
+            with page.page.expect_response(is_read):
+                form.get_by_role("button", name="Save settings").click()
+            assert store.tag_settings("cart") == told
             expect(form.get_by_label("Height")).to_have_value(typed)
 
         form.get_by_label("Name").fill("Mine")
@@ -89,6 +90,34 @@ def test_settings_are_saved_undone_and_merged_with_those_of_another_page(chromiu
         form.get_by_role("button", name="Save settings").click()
         outcome.get_by_role("button", name="Keep mine").click()
         wait_until(lambda: store.tag_settings("cart") == TagSettings(name="Mine", height_m=2.0))
+
+
+def is_read(answer: Response) -> bool:
+    """Return whether the page has read the settings of a tag."""
+    return answer.request.method == "GET" and answer.url.endswith("/settings")
+
+
+def test_what_another_page_saved_while_the_same_was_typed_here_is_not_overwritten_unasked(
+    chromium: Browser, place: Place
+) -> None:
+    place.move("cart", x=1.0, y=1.0)
+    store, held = place.bench.answers.site, list[Route]()
+
+    def hold(route: Route) -> None:
+        held.append(route) if route.request.method == "GET" else route.continue_()
+
+    with watched_page(chromium, place.url) as page:
+        form = open_settings(page, "cart")
+        page.page.route("**/settings", hold, times=2)  # a change, and the reading that follows it
+        form.get_by_label("Group").fill("vans")
+        with page.page.expect_request(lambda request: request.method == "GET" and request.url.endswith("/settings")):
+            form.get_by_role("button", name="Save settings").click()
+        form.get_by_label("Name").fill("Mine")
+        store.set_tag("cart", TagSettings(name="Theirs", group="vans"))
+        held[0].continue_()
+        form.get_by_role("button", name="Save settings").click()
+        page.page.locator("#outcome").get_by_role("button", name="Keep mine").click()
+        wait_until(lambda: store.tag_settings("cart") == TagSettings(name="Mine", group="vans"))
 
 
 @pytest.mark.parametrize(("height", "told"), [("2", TagSettings(height_m=2.0)), ("", TagSettings())])

@@ -34,18 +34,25 @@ export function fillForm(form, settings, groups) {
   form.querySelector("datalist")?.replaceChildren(...[...groups].sort().map((group) => new Option(group)));
 }
 
+/** Return what a person has seen or is saving. @param {HTMLInputElement} input */
+const known = ({ dataset }) => dataset.sent ?? dataset.shown;
+
 /** Return whether a person has typed what is neither saved nor being saved. @param {HTMLInputElement} input */
-const isTyped = ({ value, dataset }) => value !== (dataset.sent ?? dataset.shown);
+const isTyped = (input) => input.value !== known(input);
 
 /** Note that what the form shows now is being saved, or that it is not. @param {HTMLFormElement} form @param {boolean} isSent */
 export function noteSent(form, isSent) {
   for (const { dataset, value } of FIELDS.map((name) => fieldOf(form, name))) isSent ? (dataset.sent = value) : delete dataset.sent;
 }
 
-/** Return what puts back what a person has typed and not saved, after the form was filled anew. @param {HTMLFormElement} form */
+/** Return what puts back what a person has typed and not saved, after the form was filled anew, and returns whether somebody else has
+ * changed one of these fields. @param {HTMLFormElement} form */
 export function typedIn(form) {
-  const typed = FIELDS.map((name) => fieldOf(form, name)).filter(isTyped).map((input) => ({ input, value: input.value }));
-  return () => typed.forEach(({ input, value }) => (input.value = value));
+  const typed = FIELDS.map((name) => fieldOf(form, name)).filter(isTyped).map((input) => ({ input, value: input.value, was: known(input) }));
+  return () => {
+    typed.forEach(({ input, value }) => (input.value = value));
+    return typed.some(({ input, was }) => input.dataset.shown !== was);
+  };
 }
 
 /** Return the settings that a person has changed. @param {HTMLFormElement} form */

@@ -78,15 +78,15 @@ export class TagPanel {
   /** @param {boolean} keep */
   async #read(keep) {
     const tag = this.#tag;
-    this.#seen = null;
+    if (tag !== this.#filled || !this.box.open) this.#seen = null;
     if (!tag || !this.box.open) return;
     try {
       const seen = await this.changes.read(this.#path);
       if (tag !== this.#tag) return;
-      this.#seen = seen;
-      const typeAgain = keep && tag === this.#filled ? typedIn(this.form) : () => {};
+      const typeAgain = keep && tag === this.#filled ? typedIn(this.form) : () => false;
       fillForm(this.form, seen.value, new Set(this.fleet.groups.filter((group) => group !== "")));
-      typeAgain();
+      const isOvertaken = typeAgain(); // then what was read before stays, so that saving asks
+      this.#seen = isOvertaken && this.#seen ? this.#seen : seen;
       this.#filled = tag;
     } catch {
       // A tag that was deleted has no settings. The table drops it with its next update.
@@ -108,6 +108,7 @@ export class TagPanel {
 
   /** @param {string} what @param {object} patch @param {import("../data/changes.js").More} [more] */
   async #edit(what, patch, more) {
+    await this.#loading;
     const seen = this.#seen ?? (await this.changes.read(this.#path));
     return this.changes.edit(what, this.#path, patch, seen, () => this.#load(false), more);
   }
