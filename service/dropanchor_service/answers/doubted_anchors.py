@@ -1,4 +1,4 @@
-"""Which anchor seems to have moved, as a hint about the poses that rest on it."""
+"""Which anchor seems to stand elsewhere than the site says, as a hint about the poses that rest on it."""
 
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -21,8 +21,19 @@ def anchor_moved(anchor: str, way_m: float, since_ns: int) -> str:
     )
 
 
+def anchor_misplaced(anchor: str, way_m: float) -> str:
+    return say(
+        "anchor_misplaced",
+        "Anchor {anchor}, or another one that its tags hear, seems to stand about {way} m from where the site says: "
+        "measure their places again, or save it again to confirm its place.",
+        anchor=anchor,
+        way=f"{way_m:.1f}",
+    )
+
+
 def about_anchors(poses: Array, tags: TagTable) -> Iterator[tuple[str, int]]:
-    """Yield which anchor seems to have moved, and the place of each pose that rests on it."""
+    """Yield which anchor seems to stand elsewhere, and the place of each pose that rests on it."""
     for place in np.flatnonzero(poses["reason"] == StateReason.ANCHOR_DOUBTED).tolist():
         if (doubt := tags.rows.anchor_doubts.of(int(poses["row"][place]))) is not None:
-            yield anchor_moved(*doubt), place
+            anchor, way_m, since_ns = doubt
+            yield anchor_moved(*doubt) if since_ns else anchor_misplaced(anchor, way_m), place

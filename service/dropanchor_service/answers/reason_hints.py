@@ -39,7 +39,7 @@ _HINTS = {
         "sensor_fault", "A sensor of this tag failed its check: look at what this tag needs."
     ),
     StateReason.ANCHOR_DOUBTED: say(
-        "anchor_doubted", "An anchor seems to have moved: say where it is, or save it again to confirm its place."
+        "anchor_doubted", "An anchor seems to stand elsewhere: say where it is, or save it again to confirm its place."
     ),
     StateReason.FRONT_OR_BACK: say(
         "front_or_back",

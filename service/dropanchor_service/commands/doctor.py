@@ -133,7 +133,7 @@ def _of_samples(status: Mapping[str, Any], explanation: Mapping[str, Any]) -> It
 
 def _of_anchors(explanation: Mapping[str, Any]) -> Iterator[Finding]:
     if explanation["pose"]["reason"] == "anchor_doubted":
-        yield Finding("anchor", "the ranges of the tags contradict its place: it was moved")
+        yield Finding("anchor", "the ranges of the tags contradict its place: it was moved, or measured wrongly")
     ranges: dict[str, list[Mapping[str, Any]]] = {}
     for one in explanation["innovations"]:
         ranges.setdefault(str(one["anchor"]), []).append(one)

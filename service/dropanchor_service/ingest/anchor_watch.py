@@ -2,15 +2,19 @@
 
 An anchor that is moved makes the ranges of its tags longer or shorter all at once. The track of one tag soon explains
 that in another way; several tags, of which some come nearer and others go farther, have nothing else in common.
+
+One that was surveyed wrongly is only seen when tags meet it that know where they are, as another anchor confirms: the
+ranges to two anchors soon agree on some place, and only the first one has not had a say in it.
 """
 
 import logging
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from statistics import median
 
 import numpy as np
 
-from dropanchor_service.estimation.columns import Array, PoseBatch, State, StateReason
+from dropanchor_service.estimation.columns import Array, Frame, PoseBatch, State, StateReason
 from dropanchor_service.ingest.kernels.anchors import HEARD, STEP, follow_anchors
 from dropanchor_service.store.anchor_doubts import AnchorDoubt, AnchorDoubts
 from dropanchor_service.store.records import enlarged, take
@@ -21,6 +25,8 @@ TOGETHER_NS = 1_500_000_000  # steps of several tags within this time are one
 FRESH_NS = 5_000_000_000  # since its last range, after which a tag does not count among those that hear an anchor
 SHARE = 3  # one in so many of the tags that hear an anchor has to make the step
 FARTHER, SHARE_FARTHER = 3, 2  # tags, and one in so many, if all ranges become longer: something may stand in between
+SURE = 3.0  # standard deviations, beyond which a first range contradicts a track
+LAST = 24  # tags that met an anchor and count
 KEPT_NS = 60_000_000_000  # since its last range to an anchor in doubt, after which a track no longer rests on it
 
 _log = logging.getLogger(__name__)
@@ -35,19 +41,27 @@ class AnchorWatch:
         self._name_of = name_of
         self._heard = np.zeros(0, HEARD)  # by row
         self._steps: defaultdict[int, dict[int, tuple[int, float]]] = defaultdict(dict)  # by anchor and row: ns, m
+        self._met: defaultdict[int, dict[int, float]] = defaultdict(dict)  # by row and anchor: m, of first ranges
+        self._firsts: defaultdict[int, dict[int, float]] = defaultdict(dict)  # by anchor and row
         self._doubted: dict[int, AnchorDoubt] = {}
 
     def begin(self, row: int) -> None:
         """Forget what a row has heard that starts afresh."""
         self._reserve(row + 1)
+        self._met.pop(row, None)
         self._heard[row] = np.zeros((), HEARD)
 
     def look(self, batch: PoseBatch) -> None:
         """Add new innovations, and take `tracking` from poses that rest on an anchor in doubt, in place."""
         steps = np.empty(len(batch.innovations), STEP)
         count = follow_anchors(batch.innovations, self._heard, steps) if len(steps) else 0
-        for row, anchor, t_ns, way, lasts in steps[:count].tolist():
-            self._add_step(row, anchor, t_ns, way, alone=lasts and self._hears_one(row, t_ns))
+        for row, anchor, t_ns, way, lasts, std in steps[:count].tolist():
+            if std == 0.0:
+                self._add_step(row, anchor, t_ns, way, alone=lasts and self._hears_one(row, t_ns))
+            elif abs(way) <= max(SURE * std, LEAST_M):
+                self._meet(row, anchor, 0.0)
+            elif _knows_place(batch.poses, row, t_ns):
+                self._meet(row, anchor, way)
         if self._doubted:
             self._mark(batch.poses)
 
@@ -58,8 +72,11 @@ class AnchorWatch:
         """
         for name in ("clean_s", "before_s"):
             self._heard[name][np.isin(self._heard["anchor"], anchors)] = 0.0
+        for row in [row for row, met in self._met.items() if not met.keys().isdisjoint(anchors)]:
+            del self._met[row]
         for anchor in anchors:
             self._steps.pop(anchor, None)
+            self._firsts.pop(anchor, None)
             if (doubt := self._doubted.pop(anchor, None)) is not None:
                 self._known.end(doubt)
 
@@ -76,13 +93,32 @@ class AnchorWatch:
         for old in [other for other, (at_ns, _) in steps.items() if abs(t_ns - at_ns) > TOGETHER_NS]:
             del steps[old]
         if self._has_moved([way for _, way in steps.values()], self._hearing(anchor, t_ns), alone):
-            ways, times = [abs(way) for _, way in steps.values()], [at_ns for at_ns, _ in steps.values()]
-            doubt = AnchorDoubt(self._name_of(anchor), max(ways), min(times))
-            self._doubted[anchor] = doubt
-            _log.warning(
-                "anchor %s seems to have moved by at least %.1f m: say where it is, or put it again to confirm it",
-                *doubt[:2],
-            )
+            self._doubt(anchor, max(abs(way) for _, way in steps.values()), min(at_ns for at_ns, _ in steps.values()))
+
+    def _meet(self, row: int, anchor: int, off: float) -> None:
+        """Add the first range of a track to an anchor. off: m, by which it contradicts the track, 0: it agrees."""
+        met = self._met[row]
+        met[anchor] = off
+        if len(met) == 1 or all(met.values()):
+            return
+        for other, way in met.items():
+            firsts = self._firsts[other]
+            firsts.pop(row, None)
+            firsts[row] = way
+            if len(firsts) > LAST:
+                del firsts[next(iter(firsts))]
+            if way and other not in self._doubted:
+                ways = [off for off in firsts.values() if off]
+                if len(ways) > 1 and self._has_moved(ways, len(firsts), alone=False):
+                    self._doubt(other, median(map(abs, ways)), since_ns=0)
+
+    def _doubt(self, anchor: int, way_m: float, since_ns: int) -> None:
+        doubt = AnchorDoubt(self._name_of(anchor), way_m, since_ns)
+        self._doubted[anchor] = doubt
+        _log.warning(
+            "anchor %s seems to stand about %.1f m elsewhere: say where it is, or put it again to confirm it",
+            *doubt[:2],
+        )
 
     def _has_moved(self, ways: list[float], hearing: int, alone: bool) -> bool:
         """Return whether an anchor has moved whose ranges made these steps. hearing: tags that hear it."""
@@ -113,3 +149,9 @@ class AnchorWatch:
             for row in set(poses["row"][rests].tolist()):
                 if self._known.of(row) is None:
                     self._known.set(row, doubt)
+
+
+def _knows_place(poses: Array, row: int, t_ns: int) -> bool:
+    """Return whether a row knows where in the site it is at a time of a POSE: an ambiguous one may be elsewhere."""
+    known = (poses["state"] == State.TRACKING) & (poses["frame"] == Frame.SITE)
+    return bool((known & (poses["row"] == row) & (poses["t_ns"] == t_ns)).any())

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class AnchorDoubt(NamedTuple):
-    """anchor: its id. way_m: how far it has moved at least. since_ns: when, UTC."""
+    """anchor: its id. way_m: how far off it stands, about. since_ns: when it moved, UTC; 0: it never stood there."""
 
     anchor: str
     way_m: float

@@ -10,7 +10,7 @@ from dropanchor_schemas.wire import Frame
 from dropanchor_service.answers.hints import hints_of
 from dropanchor_service.estimation.columns import INNOVATION, POSE, Array, PoseBatch, State, StateReason
 from dropanchor_service.ingest.anchor_watch import AnchorWatch
-from dropanchor_service.store.anchor_doubts import AnchorDoubts
+from dropanchor_service.store.anchor_doubts import AnchorDoubt, AnchorDoubts
 from service.ingest.messages import ranges
 from support.ingest import IngestBench, TransparentEngine
 
@@ -19,6 +19,8 @@ T0 = 1_790_000_000 * SECOND
 MOVED_NS = T0 + 10 * SECOND
 Step = tuple[float, float]
 """m, and s by which it is later than the first."""
+Offs = tuple[float, float]
+"""m, to one anchor and to another."""
 
 
 def innovations(row: int, step: Step, anchor: int = 0, end_s: float = 15.0) -> Array:
@@ -115,6 +117,46 @@ def test_a_tag_whose_ranges_never_agreed_doubts_nothing() -> None:
     assert doubts.of(0) is None
 
 
+def met(row: int, offs: Offs, state: State) -> PoseBatch:
+    """Return the first range of a tag to each of two anchors, and how far it contradicts the track."""
+    found, poses = np.zeros(2, INNOVATION), np.zeros(2, POSE)
+    for column in (found, poses):
+        column["row"], column["t_ns"], column["anchor"] = row, T0 + np.arange(2), [0, 1]
+    found["innovation"], found["S"], poses["state"] = offs, 0.1, state
+    return PoseBatch(poses=poses, innovations=found)
+
+
+@pytest.mark.parametrize(
+    ("tags", "state", "doubted"),
+    [
+        ([(0.0, -3.0), (0.0, 2.0)], State.TRACKING, "1"),
+        ([(-3.0, 0.0), (-3.0, 0.0), (0.0, 0.0)], State.TRACKING, "0"),
+        ([(0.0, 3.0)] * 3, State.TRACKING, "1"),
+        ([(0.0, 3.0)] * 2, State.TRACKING, None),  # something stands before the anchor
+        ([(0.0, -3.0)], State.TRACKING, None),  # that is the matter of one tag
+        ([(-3.0, -3.0)] * 4, State.TRACKING, None),  # all ranges are too short, or the start is wrong
+        ([(0.0, -0.9)] * 4, State.TRACKING, None),  # less than three deviations
+        ([(0.0, 0.0)] * 5 + [(0.0, -3.0)] * 2, State.TRACKING, None),
+        ([(0.0, -3.0)] * 4, State.AMBIGUOUS, None),  # the tags may be elsewhere
+    ],
+)
+def test_an_anchor_is_doubted_that_tags_meet_elsewhere_than_their_tracks_say(
+    tags: list[Offs], state: State, doubted: str | None
+) -> None:
+    doubts = AnchorDoubts()
+    watch = AnchorWatch(doubts, str)
+    for row, offs in enumerate(tags):
+        watch.begin(row)
+        watch.look(met(row, offs, state))
+    watch.look(PoseBatch(poses=poses_at_end([0])))
+    found = doubts.of(0)
+    assert (found and (found.anchor, found.since_ns)) == (doubted and (doubted, 0))
+    watch.told([0, 1])
+    watch.look(met(0, tags[0], state))  # no longer a first range
+    watch.look(PoseBatch(poses=poses_at_end([0])))
+    assert doubts.of(0) is None
+
+
 class Contradicting(TransparentEngine):
     """An engine whose track denies every range that is longer than 40 m or shorter than 20 m."""
 
@@ -151,3 +193,6 @@ def test_the_hint_names_the_anchor_and_saving_it_again_confirms_its_place() -> N
     bench.site.set_anchor(Anchor(id="7"))
     sent(bench, "a", 30.0, 13, 14)
     assert bench.latest.row(0)["state"] == State.TRACKING  # type: ignore[index]
+    bench.tags.rows.anchor_doubts.set(0, AnchorDoubt("7", 3.0, 0))
+    texts, hint = hints_of(np.array([pose], POSE), bench.site, bench.tags, bench.clock.now_ns())
+    assert texts[hint[0]].startswith("Anchor 7, or another one that its tags hear, seems to stand about 3.0 m from ")

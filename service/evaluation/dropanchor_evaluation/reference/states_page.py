@@ -4,7 +4,7 @@ from dropanchor_evaluation.reference.markdown import table
 from dropanchor_schemas.pose import StateReason, TrackingState
 from dropanchor_schemas.rejections import Reason
 from dropanchor_service.answers.columns import REASONS
-from dropanchor_service.answers.doubted_anchors import anchor_moved
+from dropanchor_service.answers.doubted_anchors import anchor_misplaced, anchor_moved
 from dropanchor_service.answers.hints import (
     FORWARD_IMU,
     FORWARD_RANGES,
@@ -87,6 +87,7 @@ _CAUSES = (
     ("`uncertain`, an IMU alone, and no `mount_angle_rad` in the settings", MOUNT_UNKNOWN),
     ("`resolved` in the state `relative`", RELATIVE_HINT),
     ("`anchor_doubted`", anchor_moved("7", 2.9, 1_790_000_000_000_000_000)),
+    ("`anchor_doubted`", anchor_misplaced("7", 2.9)),
     ("times that look like seconds, milliseconds or microseconds", hint_about_time(1_800_000_000_000)),
     ("other times before 2015, without the flag for a clock that counts from boot", hint_about_time(0)),
 )
