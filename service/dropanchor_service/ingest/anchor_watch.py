@@ -65,6 +65,11 @@ class AnchorWatch:
         if self._doubted:
             self._mark(batch.poses)
 
+    def heard(self, poses: Array) -> tuple[Array, Array]:
+        """Return the anchors that the row of each POSE has heard, and which of them it hears."""
+        heard = take(self._heard, poses["row"])
+        return heard["anchor"], heard["last_ns"] > np.maximum(poses["t_ns"] - FRESH_NS, 0)[:, None]
+
     def told(self, anchors: Sequence[int]) -> None:
         """Trust these anchors again: somebody has said where they are.
 

@@ -21,6 +21,7 @@ from dropanchor_service.ingest.norths import NorthWatch
 from dropanchor_service.ingest.quarantine import Quarantine
 from dropanchor_service.ingest.references import PressureReferences
 from dropanchor_service.ingest.starts import StartWatch
+from dropanchor_service.ingest.survey_errors import widen
 from dropanchor_service.ingest.told_heights import ToldHeights
 from dropanchor_service.ingest.units import convert, has_units
 from dropanchor_service.metrics.registry import Metrics
@@ -186,6 +187,7 @@ class GuardedEngine:
         for batch in self._bisected(usable, now_ns) if any(map(len, usable.columns())) else ():
             self._starts.look(batch)
             self._anchor_watch.look(batch)
+            widen(batch.poses, *self._anchor_watch.heard(batch.poses), self.anchors.places)
             self._sensors.mark(batch.poses)
             self._heights.mark(batch.poses)
             self._norths.look(now_ns)
