@@ -4,7 +4,6 @@ import os
 import re
 import signal
 import subprocess
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -61,16 +60,13 @@ def test_the_demo_shows_moving_tags_and_ctrl_c_ends_all_its_processes() -> None:
             lambda: all(
                 abs(pose["x"] - before[tag]["x"]) + abs(pose["y"] - before[tag]["y"]) > 1.0
                 for tag, pose in poses(url).items()
-            ),
-            60.0,
+            )
         )
         wait_until(lambda: {pose["state"] for pose in poses(url).values()} == {"tracking"})
         assert "<html" in httpx.get(url, verify=False).text.lower()
         (tags,) = children(process.pid)
-        started = time.monotonic()
         os.killpg(process.pid, signal.SIGINT)  # what a terminal sends on Ctrl-C
         assert process.wait(PATIENCE_S) == 0
-        assert time.monotonic() - started < 30.0
         assert not Path(f"/proc/{tags}").exists()
 
 

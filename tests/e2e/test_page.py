@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 
 from dropanchor_tag_client import TagClient
 from support.browser import WatchedPage, running_chromium, watched_page
@@ -89,8 +89,8 @@ def test_the_page_marks_every_pose_as_out_of_date_until_the_service_is_back(chro
             stack.enter_context(driving_tag("cart", endpoint))
             page.page.locator("tr[data-tag='cart']").wait_for()
         page.page.locator("#lost").wait_for(state="visible")
-        assert page.page.locator("tr[data-tag='cart'] td.c-state").inner_text() == "Out of date"
-        assert page.tags()["cart"]["state"] == "outdated"
+        expect(page.page.locator("tr[data-tag='cart'] td.c-state")).to_have_text("Out of date")
+        page.wait_for("dropanchor.tags()[0].state === 'outdated'")
         with running_service("--config", str(config), "--port", str(port), endpoint=endpoint):
             page.wait_for("dropanchor.status() === 'live'")
             page.page.locator("#lost").wait_for(state="hidden")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from math import hypot
 from pathlib import Path
+from typing import Any
 
 from dropanchor_tag_client import TagClient
 from dropanchor_tag_client.sources.modules.catalogue import MODULES
@@ -39,23 +40,24 @@ def imu_of_others(endpoint: str) -> Iterator[None]:
             yield
 
 
-def distance(began_s: float) -> float:
-    return hypot(10.0, -20.0 + SPEED_MPS * (time.monotonic() - began_s))
+def distance(after_s: float) -> float:
+    return hypot(10.0, -20.0 + SPEED_MPS * after_s)
 
 
 def moving(text: Callable[[float], bytes], began_s: float) -> Answer:
     """Return the answers of a module that moves north from (10, -20) past the anchor."""
-    return lambda sent: b"" if sent else text(distance(began_s))
+    return lambda sent: b"" if sent else text(distance(time.time() - began_s))
 
 
-def is_on_its_range(x: float, y: float, began_s: float) -> bool:
-    return abs(hypot(x, y) - distance(began_s)) < 0.5 and time.monotonic() - began_s > 8.0
+def is_on_its_range(pose: dict[str, Any], began_s: float) -> bool:
+    after_s = pose["t_ns"] * 1e-9 - began_s
+    return after_s > 8.0 and abs(hypot(pose["x"], pose["y"]) - distance(after_s)) < 0.5
 
 
 def test_each_module_is_a_dot_that_moves_along_its_ranges(tmp_path: Path) -> None:
     config = settings_file(tmp_path, list(EXAMPLES))
     with running_service("--config", str(config)) as service, ExitStack() as stack:
-        began_s = time.monotonic()
+        began_s = time.time()
         for name, example in EXAMPLES.items():
             answer, baud = moving(example.text, began_s), MODULES[name].baud
             module = stack.enter_context(plugged_in(tmp_path / name, answer, baud, period_s=0.1))
@@ -65,17 +67,14 @@ def test_each_module_is_a_dot_that_moves_along_its_ranges(tmp_path: Path) -> Non
             stack.callback(process.terminate)
         stack.enter_context(imu_of_others(service.zenoh))
 
-        def poses() -> dict[str, tuple[float, float]]:
-            return {
-                pose["tag"]: (pose["x"], pose["y"])
-                for pose in service.get("/api/v1/poses")["poses"]
-                if pose["x"] is not None
-            }
+        def poses() -> dict[str, dict[str, Any]]:
+            return {pose["tag"]: pose for pose in service.get("/api/v1/poses")["poses"] if pose["x"] is not None}
 
         wait_until(lambda: set(poses()) == set(EXAMPLES))
         first = poses()
 
-        def follows_its_ranges(tag: str, x: float, y: float) -> bool:
-            return is_on_its_range(x, y, began_s) and hypot(x - first[tag][0], y - first[tag][1]) > 1.0
+        def follows_its_ranges(pose: dict[str, Any]) -> bool:
+            moved_m = hypot(*(pose[axis] - first[pose["tag"]][axis] for axis in "xy"))
+            return is_on_its_range(pose, began_s) and moved_m > 1.0
 
-        wait_until(lambda: all(follows_its_ranges(tag, *place) for tag, place in poses().items()))
+        wait_until(lambda: all(map(follows_its_ranges, poses().values())))

@@ -141,7 +141,7 @@ def test_ctrl_c_ends_the_command_and_its_processes(tmp_path: Path) -> None:
     assert process.returncode == 130
     assert rest.endswith(b"stopped\n")
     assert b"Traceback" not in rest
-    assert _all_ended(process.pid, within_s=30.0)
+    assert _all_ended(process.pid, within_s=PATIENCE_S)
 
 
 def _all_ended(group: int, within_s: float) -> bool:

@@ -50,8 +50,8 @@ def stop_publishing(tag: subprocess.Popen[str]) -> None:
 
 def disturb(service: Running, link: LossyLink) -> None:
     """Cut the link for CUT_S, then lose a share LOSS of its packets for LOSSY_S."""
-    before = used(service)
     link.loss = 1.0
+    before = used(service)
     time.sleep(CUT_S)
     assert used(service) <= before + HZ, "the link was not cut"
     link.loss = LOSS

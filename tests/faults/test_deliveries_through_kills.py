@@ -16,6 +16,7 @@ import zenoh
 
 from dropanchor_schemas.keys import all_tags
 from support.mail_server import MailServer, running_mail_server
+from support.patience import PATIENCE_S
 from support.receiver import Receiver, running_receiver
 from support.service import Running, running_service
 from support.zenoh_router import free_endpoint, free_port, wait_until
@@ -43,7 +44,7 @@ def start_at(service: Running, x: float) -> None:
         service.put(f"/api/v1/tags/{tag}/settings", {"name": NAMES.get(tag, ""), "start": start})
 
 
-def stand(service: Running, x: float, until: Any, timeout_s: float = 90.0) -> None:
+def stand(service: Running, x: float, until: Any, timeout_s: float = PATIENCE_S) -> None:
     """Send samples of all tags, which stand there, until the condition holds."""
     end_s = time.monotonic() + timeout_s
     with httpx.Client(base_url=service.url, trust_env=False, verify=False) as client:

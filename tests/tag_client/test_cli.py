@@ -1,7 +1,6 @@
 """The command line: help with examples, clear errors, and a clean end on signals."""
 
 import signal
-import time
 from pathlib import Path
 
 import pytest
@@ -82,10 +81,8 @@ def test_a_signal_ends_a_replay_quickly_and_buffered_samples_are_sent(
         process = start_python(*COMMAND, "replay", str(recording), "--connect", router_endpoint, "--loop")
         try:
             wait_until(lambda: len(heard.ranges()) >= 3)
-            began = time.monotonic()
             process.send_signal(number)
             process.wait(PATIENCE_S)
-            assert time.monotonic() - began < 30.0
         finally:
             process.kill()
             _, errors = process.communicate()

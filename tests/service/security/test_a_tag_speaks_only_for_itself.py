@@ -99,12 +99,12 @@ def _answers(payload: bytes, otherwise: str = POSE_OF_B) -> Callable[[zenoh.Quer
 
 
 def query_payloads(session: zenoh.Session, selector: str, **how: Any) -> list[bytes]:
-    replies = session.get(selector, timeout=2.0, **how)
+    replies = session.get(selector, timeout=PATIENCE_S, **how)
     return [bytes(reply.ok.payload) for reply in replies if reply.ok is not None]
 
 
 def live_tags(session: zenoh.Session) -> list[str]:
-    replies = session.liveliness().get(keys.all_tags(SITE, "alive"), timeout=2.0)
+    replies = session.liveliness().get(keys.all_tags(SITE, "alive"), timeout=PATIENCE_S)
     return [key for reply in replies if reply.ok is not None and "ghost" not in (key := str(reply.ok.key_expr))]
 
 
@@ -177,7 +177,7 @@ def test_a_tag_speaks_only_for_itself_and_without_access_control_every_attack_su
             assert [name for name, succeeded in done.items() if succeeded()] == []
         else:
             for name, succeeded in done.items():
-                end_s = time.monotonic() + 10.0
+                end_s = time.monotonic() + PATIENCE_S
                 while not (ok := succeeded()) and time.monotonic() < end_s:
                     world.exchange()
                 assert ok, f"this attack never succeeds, so the guarded test proves nothing: {name}"

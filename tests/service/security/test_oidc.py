@@ -22,6 +22,7 @@ from dropanchor_service.security.oidc import RETRY_S, SOURCE, OidcTokens, Signin
 from dropanchor_service.settings.model import OidcSettings
 from dropanchor_service.settings.sites import ScopeName
 from support.api import ask, make_api_bench
+from support.patience import PATIENCE_S
 
 AUDIENCE = "dropanchor-yard"
 
@@ -259,7 +260,7 @@ def test_no_token_waits_for_a_hanging_provider_whose_keys_were_fetched(provider:
     now_s = 1e6
     first = Thread(target=keys.find, args=["one"])
     first.start()
-    assert requested.wait(10)
+    assert requested.wait(PATIENCE_S)
     assert keys.find("one")
     assert first.is_alive()
     release.set()

@@ -27,22 +27,27 @@ UNKNOWN = "RNG peer 0x12 dist 1234 mm q=9"
 
 
 def heard(
-    endpoint: str, folder: Path, answer: Answer, sentence: str, *options: str, baud: int = 115_200, wait_s: float = 30.0
+    endpoint: str,
+    folder: Path,
+    answer: Answer,
+    sentence: str,
+    *options: str,
+    baud: int = 115_200,
 ) -> str:
     """Run the command at a module until it says something, and return all that it said."""
     with plugged_in(folder / "port", answer, baud, period_s=0.1) as module:
         command = ("-m", "dropanchor_tag_client", "serial", str(module.path), "--tag", "a", "--connect", endpoint)
         process = start_python(*command, *options)
         try:
-            text = read_until(process, sentence, wait_s)
+            text = read_until(process, sentence)
         finally:
             process.terminate()
             rest = process.communicate(timeout=PATIENCE_S)[1]
     return text + rest
 
 
-def read_until(process: "Popen[str]", sentence: str, wait_s: float) -> str:
-    errors, text, end_s = process.stderr, "", time.monotonic() + wait_s
+def read_until(process: "Popen[str]", sentence: str) -> str:
+    errors, text, end_s = process.stderr, "", time.monotonic() + PATIENCE_S
     assert errors is not None
     while sentence not in text:
         assert time.monotonic() < end_s, text
@@ -112,7 +117,7 @@ def test_a_board_that_talks_is_not_taken_for_a_module_nor_written_to(
         process = start_python(*command)
         try:
             for _ in range(2):
-                read_until(process, "try: --pattern 'Distance: {range:cm}' (the line does not say its unit", 30.0)
+                read_until(process, "try: --pattern 'Distance: {range:cm}' (the line does not say its unit")
         finally:
             process.terminate()
             process.communicate(timeout=PATIENCE_S)
