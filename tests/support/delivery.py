@@ -45,7 +45,7 @@ class DeliveryBench:
         self.destinations = open_destinations(folder)
         self.store = EventStore(database, "yard", lambda draft: addressees(self.destinations, draft))
         self.deliveries = Deliveries(database)
-        settings = DeliverySettings.model_validate({"allow_networks": LOOPBACK, "timeout_s": 2.0} | delivery)
+        settings = DeliverySettings.model_validate({"allow_networks": LOOPBACK, "timeout_s": 60.0} | delivery)
         self.channels = Channels(settings, email or EmailSettings(), mqtt or MqttSettings(), name_of)
         patience = Patience(
             retry_s=0.2, give_up_ns=round(give_up_s * 1e9), second_chance_ns=round(second_chance_s * 1e9)

@@ -117,7 +117,8 @@ def test_an_anchor_moved_by_a_drag_or_by_keys_moves_in_every_open_page_and_undo_
         outcome.get_by_role("button", name="Undo").click()
         expect(outcome).to_contain_text("Undone: Anchor 17 moved.")
         assert anchors_of(place)["17"] == Anchor(id="17")
-        other.wait_for("dropanchor.anchors()[0].x === 0")
+        for one in (page, other):
+            one.wait_for("dropanchor.anchors()[0].x === 0")
         page.page.locator("#map").focus()
         for key in ("ArrowRight", "ArrowRight", "Shift+ArrowUp"):
             page.page.keyboard.press(key)
@@ -146,6 +147,9 @@ def test_a_drag_over_a_change_of_another_page_asks_whose_is_kept(chromium: Brows
         wait_until(lambda: anchors_of(place)["17"].x < 3.0)
         page.wait_for("dropanchor.anchors()[0].x < 3 && dropanchor.drawing().still")
         expect(outcome).not_to_contain_text("Somebody else")
+        expect(page.page.get_by_role("form", name="Place the anchor").get_by_role("status")).to_have_text(
+            ""
+        )  # read again
         drag(page, "17", 0, 60)
         confirm(page)
         wait_until(lambda: anchors_of(place)["17"].y > 1.2)

@@ -75,9 +75,9 @@ def subscribed(broker: Mosquitto) -> Iterator[Heard]:
         yield heard
 
 
-def on(broker: Mosquitto, version: str = "5") -> DeliveryBench:
+def on(broker: Mosquitto, version: str = "5", timeout_s: float = 60.0) -> DeliveryBench:
     mqtt = {"server": "127.0.0.1", "port": broker.port, "tls": False, "version": version}
-    return DeliveryBench(mqtt=MqttSettings.model_validate(mqtt))
+    return DeliveryBench(mqtt=MqttSettings.model_validate(mqtt), timeout_s=timeout_s)
 
 
 def put(bench: DeliveryBench, **fields: Any) -> None:
@@ -252,7 +252,7 @@ def test_a_wrong_password_is_named_and_a_refused_topic_stops_no_other(tmp_path: 
 
 def test_a_broker_that_never_answers_delays_no_other_destination(tmp_path: Path) -> None:
     with mosquitto(tmp_path) as broker, running_receiver(receiver := Receiver()):
-        bench = on(broker)
+        bench = on(broker, timeout_s=2.0)
         with subscribed(broker):
             assert broker.process is not None  # and it listens
         broker.process.send_signal(signal.SIGSTOP)

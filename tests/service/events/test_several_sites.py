@@ -135,7 +135,7 @@ def test_a_site_without_events_has_no_file_of_them(tmp_path: Path) -> None:
 
 
 def test_destinations_of_equal_names_get_the_events_of_their_site_and_a_storm_of_one_delays_no_other() -> None:
-    benches, receivers = [DeliveryBench(timeout_s=20.0) for _ in range(2)], [Receiver(), Receiver()]
+    benches, receivers = [DeliveryBench() for _ in range(2)], [Receiver(), Receiver()]
     outboxes = [one.outbox for one in benches]
     thread = DeliveryThread(outboxes, Patience(0.2, 10**15), time.time_ns)
     with running_receiver(receivers[0]), running_receiver(receivers[1]), thread:

@@ -24,10 +24,6 @@ from support.zenoh_router import wait_until
 REQUEST = b"GET / HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n"
 
 
-class ShortDeadlines(GuardedProtocol):
-    stalled_s = 0.3
-
-
 class PatientUntilShutdown(GuardedProtocol):
     stalled_s = 3600.0
 
@@ -93,10 +89,11 @@ def test_a_server_stops_in_time_with_a_client_that_does_not_read_its_last_respon
 
 
 def test_a_connection_that_was_closed_twice_is_left_alone(tmp_path: Path) -> None:
-    with serving(tmp_path, ShortDeadlines) as served, stuck_client(served):
+    with serving(tmp_path, PatientUntilShutdown) as served, stuck_client(served):
         [protocol] = served.protocols
         protocol.loop.call_soon_threadsafe(protocol.transport.close)
         fired = threading.Event()
-        protocol.loop.call_soon_threadsafe(protocol.loop.call_later, 2 * ShortDeadlines.stalled_s, fired.set)
+        protocol.loop.call_soon_threadsafe(protocol._cut_if_stalled, 0)  # as its timer does
+        protocol.loop.call_soon_threadsafe(fired.set)
         assert fired.wait(PATIENCE_S)
         assert served.errors == []
