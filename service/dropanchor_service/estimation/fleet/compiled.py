@@ -6,6 +6,8 @@ from typing import Any, ClassVar, NoReturn, TypeVar
 import numba
 from numba.core.registry import CPUDispatcher
 
+from dropanchor_service.estimation.fleet.plain_python import in_plain_python
+
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 RELAXED = {"contract", "nsz"}  # fused multiply-add; infinities and NaN keep their meaning
@@ -31,6 +33,8 @@ def njit(borrows: bool = False, cache: bool = False, **options: Any) -> Callable
     borrows: the kernel makes and returns no array, so it counts no references to those that it is given. To count them
     took a twelfth of the time of the belief. cache: it is kept on disk, and Python may call it.
     """
+    if numba.config.DISABLE_JIT:
+        return in_plain_python
     if borrows:
         options["_nrt"] = False
     inner = not cache and not Inner.called_from_python
