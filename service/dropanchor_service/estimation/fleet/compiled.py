@@ -33,7 +33,7 @@ def njit(borrows: bool = False, cache: bool = False, **options: Any) -> Callable
     borrows: the kernel makes and returns no array, so it counts no references to those that it is given. To count them
     took a twelfth of the time of the belief. cache: it is kept on disk, and Python may call it.
     """
-    if numba.config.DISABLE_JIT:
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         return in_plain_python
     if borrows:
         options["_nrt"] = False

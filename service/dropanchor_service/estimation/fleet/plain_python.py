@@ -23,7 +23,7 @@ def in_plain_python(function: Kernel) -> Kernel:
     return called  # type: ignore[return-value]
 
 
-class _Record(np.record):
+class _Record(np.record):  # type: ignore[misc]  # said to be final, and is not
     """A record whose field hides a method of the same name, such as `std`."""
 
     def __getattribute__(self, name: str) -> Any:
