@@ -6,11 +6,12 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, Field, FiniteFloat
 
-from dropanchor_schemas.events import Event, EventType
+from dropanchor_schemas.events import Event
 from dropanchor_schemas.models import Exact, Frozen
 from dropanchor_schemas.pose import Phrase
 from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Id, NumberOnly, StrictBool
+from dropanchor_schemas.zones import EventType
 
 SECRET_PREFIX = "whsec_"
 ADDRESS = r"^[A-Za-z0-9.!#$%&'*+/=?^_`{|}~-]+@[A-Za-z0-9.-]+$"

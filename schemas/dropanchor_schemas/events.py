@@ -6,24 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from dropanchor_schemas.models import Frozen
-from dropanchor_schemas.zones import Severity
-
-
-class EventType(StrEnum):
-    """What has happened."""
-
-    ZONE_ENTER = "dropanchor.zone.enter"
-    ZONE_EXIT = "dropanchor.zone.exit"
-    ZONE_DWELL = "dropanchor.zone.dwell"
-    ZONE_SPEED = "dropanchor.zone.speed"
-    TAGS_TOO_CLOSE = "dropanchor.tags.too_close"
-    TAG_BATTERY_LOW = "dropanchor.tag.battery_low"
-    TAG_LOST = "dropanchor.tag.lost"
-    TAG_AMBIGUOUS = "dropanchor.tag.ambiguous"
-    EVENT_RETRACTED = "dropanchor.event.retracted"
-    ALARM_OVER = "dropanchor.alarm.over"
-    ALARM_ACKNOWLEDGED = "dropanchor.alarm.acknowledged"
-    DESTINATION_TEST = "dropanchor.destination.test"
+from dropanchor_schemas.zones import EventType, Severity
 
 
 class RetractionReason(StrEnum):

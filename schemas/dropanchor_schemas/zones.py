@@ -37,6 +37,23 @@ class Circle(Exact):
     radius_m: Annotated[FiniteFloat, Field(ge=0.1, le=10_000), NumberOnly]
 
 
+class EventType(StrEnum):
+    """What has happened. That of a rule ends with the `type` of the rule."""
+
+    ZONE_ENTER = "dropanchor.zone.enter"
+    ZONE_EXIT = "dropanchor.zone.exit"
+    ZONE_DWELL = "dropanchor.zone.dwell"
+    ZONE_SPEED = "dropanchor.zone.speed"
+    TAGS_TOO_CLOSE = "dropanchor.tags.too_close"
+    TAG_BATTERY_LOW = "dropanchor.tag.battery_low"
+    TAG_LOST = "dropanchor.tag.lost"
+    TAG_AMBIGUOUS = "dropanchor.tag.ambiguous"
+    EVENT_RETRACTED = "dropanchor.event.retracted"
+    ALARM_OVER = "dropanchor.alarm.over"
+    ALARM_ACKNOWLEDGED = "dropanchor.alarm.acknowledged"
+    DESTINATION_TEST = "dropanchor.destination.test"
+
+
 class Severity(StrEnum):
     """What a rule makes when it finds something: an event alone, or also an alarm, which lasts until it is over."""
 
@@ -142,7 +159,7 @@ class TooCloseRule(_Rule):
     """
 
     type: Literal["too_close"]
-    distance_m: Annotated[FiniteFloat, Field(ge=0.1, le=1000), NumberOnly]
+    distance_m: Annotated[FiniteFloat, Field(ge=0.1, le=1000, examples=[3.0]), NumberOnly]
     delay_s: Annotated[FiniteFloat, Field(ge=0, le=600), NumberOnly] = Field(
         default=1.0, description="How long they must be so close."
     )
@@ -169,7 +186,8 @@ class AmbiguousRule(_Rule):
     after_s: Annotated[FiniteFloat, Field(ge=0, le=86_400), NumberOnly] = 120.0
 
 
-EventRule = Annotated[TooCloseRule | BatteryLowRule | LostRule | AmbiguousRule, Field(discriminator="type")]
+TagRule = BatteryLowRule | LostRule | AmbiguousRule
+EventRule = Annotated[TooCloseRule | TagRule, Field(discriminator="type")]
 
 
 class EventRuleList(BaseModel):

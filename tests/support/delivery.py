@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from dropanchor_schemas.destinations import Destination, WebhookDestination
-from dropanchor_schemas.events import EventType
 from dropanchor_schemas.site import Site
+from dropanchor_schemas.zones import EventType
 from dropanchor_service.delivery.channels import Channels
 from dropanchor_service.delivery.live_site import LiveSite
 from dropanchor_service.delivery.queue import Patience

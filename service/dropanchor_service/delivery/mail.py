@@ -19,7 +19,7 @@ from dropanchor_service.delivery.addresses import RefusedAddressError, connected
 from dropanchor_service.delivery.channel import ChannelError, Outcome, Portion, Verdict, password_in
 from dropanchor_service.delivery.public_addresses import Network
 from dropanchor_service.delivery.sentences import NameOf, kind, link, place_and_time, sentence, site_of
-from dropanchor_service.delivery.words import WORDS, Words
+from dropanchor_service.delivery.words import Words, words_in
 from dropanchor_service.settings.events import EmailSettings
 
 MAX_EVENTS = 10_000  # in one mail, which is then about 1 MB
@@ -46,7 +46,7 @@ class MailChannel:
         return Portion(MAX_EVENTS, is_mixed=True, pause_s=self.destination.digest_s)
 
     async def send(self, events: Sequence[bytes]) -> Sequence[Outcome]:
-        words = WORDS[self.destination.language]
+        words = words_in(self.destination.language)
         mail = mail_of(events, self.settings.sender, self.destination.to, self.page, self.name_of, words)
         outcome = await self._send(mail)
         return [outcome] * len(events)
@@ -129,7 +129,7 @@ def mail_of(
 
 
 def _subject(events: Sequence[Event], name_of: NameOf, words: Words) -> str:
-    more = ", " + words.more.format(count=words.number(len(events) - 1, 0)) if len(events) > 1 else ""
+    more = ", " + words.texts["mail.more"].format(count=words.number(len(events) - 1, 0)) if len(events) > 1 else ""
     return f"[{site_of(events[0])}] {sentence(events[0], name_of, words)}{more}"
 
 
@@ -138,20 +138,20 @@ def _text(events: Sequence[Event], page: str | None, name_of: NameOf, words: Wor
     parts = [_summary(events, words)] if len(events) > LINKED else []
     parts += [_paragraph(event, linked, name_of, words) for event in events]
     if page is not None and linked is None:
-        parts.append(f"{words.page} {page}")
+        parts.append(f"{words.texts['mail.page']} {page}")
     return "\n\n".join(parts) + "\n"
 
 
 def _summary(events: Sequence[Event], words: Words) -> str:
     counts = Counter(kind(event, words) for event in events).most_common()
     counted = [f"{words.number(count, 0)} x {text}" for text, count in counts]
-    return "\n".join([words.events.format(count=words.number(len(events), 0)), *counted])
+    return "\n".join([words.texts["mail.events"].format(count=words.number(len(events), 0)), *counted])
 
 
 def _paragraph(event: Event, page: str | None, name_of: NameOf, words: Words) -> str:
     lines = [
         f"{sentence(event, name_of, words)}.",
-        f"{place_and_time(event, words)}; {words.event} {int(event.sequence)}",
+        f"{place_and_time(event, words)}; {words.texts['mail.event']} {int(event.sequence)}",
     ]
     return "\n".join([*lines, link(page, event)] if page is not None else lines)
 

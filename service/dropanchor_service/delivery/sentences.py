@@ -4,7 +4,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from urllib.parse import urlencode
 
-from dropanchor_schemas.events import Event, EventData, EventType
+from dropanchor_schemas.events import Event, EventData
 from dropanchor_service.delivery.words import Words
 from dropanchor_service.events.store import rfc3339
 
@@ -17,28 +17,36 @@ _AROUND_NS = 300_000_000_000  # of the past that a link shows, before and after 
 
 def sentence(event: Event, name_of: NameOf, words: Words) -> str:
     """Return what happened in one line, such as `Cart 3 (cart-3) entered Loading dock`."""
-    data = event.data
-    other = "" if data.other_tag is None else name_of(data.other_tag)
-    values = {"tag": name_of(event.subject), "other": other, "place": _place(data)}
-    values |= {"number": _number(event, words), "lasted": _lasted(data, words), "before": _before(data, words)}
-    values["why"] = "" if data.reason is None else words.reasons[data.reason]
-    values |= {"who": f"({data.acknowledged_by})" if data.acknowledged_by else "", "note": data.note or ""}
-    return " ".join(words.sentences[event.type].format(**values).split())
+    data, charge = event.data, event.data.battery_fraction
+    reason, before = data.reason, data.retracted_type or data.alarm_type
+    values = {
+        "tag": name_of(event.subject),
+        "other": "" if data.other_tag is None else name_of(data.other_tag),
+        "place": _place(data),
+        "time": _lasted(data, words),
+        "speed": _measure(data.speed_mps, 1, "m/s", words),
+        "distance": _measure(data.distance_m, 1, "m", words),
+        "battery": _measure(None if charge is None else charge * 100, 0, "%", words),
+        "before": "" if before is None else words.texts[f"kind.{before}"],
+        "why": "" if reason is None else words.texts[f"event.why.{reason}"],
+        "who": f"({data.acknowledged_by})" if data.acknowledged_by else "",
+        "note": data.note or "",
+    }
+    return " ".join(words.texts[f"event.{event.type}"].format(**values).split())
 
 
 def kind(event: Event, words: Words) -> str:
-    """Return what events of several tags have in common, such as `entered Loading dock`."""
-    text = words.kinds[event.type].format(place=_place(event.data), before=_before(event.data, words))
-    return " ".join(text.split())
+    """Return what events of several tags have in common, such as `Entered a zone: Loading dock`."""
+    return f"{words.texts[f'kind.{event.type}']}: {_place(event.data)}"
 
 
 def place_and_time(event: Event, words: Words) -> str:
     """Return when, where and how surely it happened, such as `…; x 3.2 m, y 1.7 m; probability 0.99`."""
     data = event.data
-    place = [_metres(value, words) for value in (data.x, data.y)]
+    place = [_measure(value, 1, "m", words) for value in (data.x, data.y)]
     where = [] if data.x is None else [f"x {place[0]}, y {place[1]}"]
     floor = None if data.probability is None else int(data.probability * 100) / 100
-    sure = [] if floor is None else [f"{words.probability} {words.number(floor, 2)}"]
+    sure = [] if floor is None else [f"{words.texts['mail.probability']} {words.number(floor, 2)}"]
     return "; ".join([words.time(datetime.fromtimestamp(data.t_ns / 1e9, UTC).astimezone()), *where, *sure])
 
 
@@ -59,24 +67,8 @@ def _place(data: EventData) -> str:
     return data.name or data.zone or data.rule or ""
 
 
-def _before(data: EventData, words: Words) -> str:
-    """Return the kind of the event that this one is about."""
-    before = data.retracted_type or data.alarm_type
-    return "" if before is None else words.kinds[before].format(place=_place(data))
-
-
-def _metres(value: float | None, words: Words) -> str:
-    return "?" if value is None else f"{words.number(value, 1)} m"
-
-
-def _number(event: Event, words: Words) -> str:
-    """Return the speed in m/s, the distance in m or the charge in percent that the event is about."""
-    data = event.data
-    charge = None if data.battery_fraction is None else data.battery_fraction * 100
-    if event.type == EventType.TAG_BATTERY_LOW:
-        return "?" if charge is None else words.number(charge, 0)
-    value = data.speed_mps if event.type == EventType.ZONE_SPEED else data.distance_m
-    return "?" if value is None else words.number(value, 1)
+def _measure(value: float | None, decimals: int, unit: str, words: Words) -> str:
+    return "?" if value is None else f"{words.number(value, decimals)} {unit}"
 
 
 def _lasted(data: EventData, words: Words) -> str:

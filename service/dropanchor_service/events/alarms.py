@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import orjson
 
 from dropanchor_schemas.alarms import Acknowledgement
-from dropanchor_schemas.events import EventType
+from dropanchor_schemas.zones import EventType
 from dropanchor_service.events.database import Database
 from dropanchor_service.events.drafts import AlarmBegan, AlarmsOver, Draft, StateKey
 

@@ -2,12 +2,11 @@
 
 from typing import Any
 
-from dropanchor_schemas.events import EventType
-from dropanchor_schemas.zones import EventRule, Severity, TooCloseRule, Zone
+from dropanchor_schemas.zones import EventRule, EventType, Severity, TagRule, TooCloseRule, Zone
 from dropanchor_service.events.drafts import AlarmBegan, Draft, StateKey, rounded
 from dropanchor_service.zones.judge import DWELL, DWELT, ENTER, EXIT, INSIDE, SPEED, TOO_FAST
 from dropanchor_service.zones.pair_watch import PairChange
-from dropanchor_service.zones.tag_watch import FleetState, TagChange
+from dropanchor_service.zones.tag_watch import FleetState, TagChange, measured
 from dropanchor_service.zones.zone_watch import ZoneChange
 
 _OF_ZONES = {
@@ -16,11 +15,7 @@ _OF_ZONES = {
     DWELL: EventType.ZONE_DWELL,
     SPEED: EventType.ZONE_SPEED,
 }
-_OF_RULES = {
-    "battery_low": EventType.TAG_BATTERY_LOW,
-    "lost": EventType.TAG_LOST,
-    "ambiguous": EventType.TAG_AMBIGUOUS,
-}
+_OF_RULES = {kind.rpartition(".")[2]: kind for kind in EventType}
 _FLAG_OF = {ENTER: INSIDE, DWELL: DWELT, SPEED: TOO_FAST}
 _ACTIVE = 1
 
@@ -58,14 +53,12 @@ def pair_event(rule: TooCloseRule, change: PairChange, key: StateKey, now_ns: in
         "other_tag": key.other,
         "distance_m": rounded(change.distance_m),
     }
-    return _draft(EventType.TAGS_TOO_CLOSE, rule, key, data)
+    return _draft(_OF_RULES[rule.type], rule, key, data)
 
 
-def tag_event(rule: EventRule, change: TagChange, key: StateKey, fleet: FleetState, now_ns: int) -> Draft:
+def tag_event(rule: TagRule, change: TagChange, key: StateKey, fleet: FleetState, now_ns: int) -> Draft:
     """Return the event of a single tag."""
-    data = _rule_data(rule, now_ns, change.since_ns)
-    if rule.type == "battery_low":
-        data["battery_fraction"] = rounded(fleet.battery[change.place])
+    data = _rule_data(rule, now_ns, change.since_ns) | measured(rule, fleet, change.place)
     return _draft(_OF_RULES[rule.type], rule, key, data)
 
 

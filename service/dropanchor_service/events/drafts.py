@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from dropanchor_schemas.events import EventType, RetractionReason
+from dropanchor_schemas.events import RetractionReason
+from dropanchor_schemas.zones import EventType
 
 
 class StateKey(NamedTuple):

@@ -5,7 +5,8 @@ from typing import Any
 
 import orjson
 
-from dropanchor_schemas.events import EventType, RetractionReason
+from dropanchor_schemas.events import RetractionReason
+from dropanchor_schemas.zones import EventType
 from dropanchor_service.events.database import Database
 from dropanchor_service.events.drafts import Draft, StartBegan, StartClosed, StateValue
 

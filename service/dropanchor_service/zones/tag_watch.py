@@ -5,13 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_schemas.zones import AmbiguousRule, BatteryLowRule, LostRule
+from dropanchor_schemas.zones import AmbiguousRule, BatteryLowRule, LostRule, TagRule
 from dropanchor_service.estimation.columns import Array, State
 from dropanchor_service.store.groups import Groups
 from dropanchor_service.store.records import enlarged
 from dropanchor_service.zones.concerned import concerned
 
-TagRule = BatteryLowRule | LostRule | AmbiguousRule
 RECHARGED = 0.05  # above its limit, a battery can be low again
 
 
@@ -31,6 +30,23 @@ class FleetState(NamedTuple):
 
     state: Array
     battery: Array
+
+
+def conditions(rule: TagRule, fleet: FleetState) -> tuple[Array, Array]:
+    """Return for which tags the condition of a rule holds, and for which it surely does not."""
+    match rule:
+        case BatteryLowRule(fraction=limit):
+            return fleet.battery < limit, fleet.battery > limit + RECHARGED
+        case LostRule():
+            return fleet.state == State.LOST, (fleet.state >= 0) & (fleet.state != State.LOST)
+        case AmbiguousRule():
+            return fleet.state == State.AMBIGUOUS, fleet.state == State.TRACKING
+
+
+def measured(rule: TagRule, fleet: FleetState, place: int) -> dict[str, float]:
+    """Return what the event of a tag says of it, as in `EventData`."""
+    is_charge = isinstance(rule, BatteryLowRule)
+    return {"battery_fraction": round(float(fleet.battery[place]), 4)} if is_charge else {}
 
 
 class TagWatch:
@@ -54,7 +70,7 @@ class TagWatch:
         """Return what has changed. names: by place."""
         n = len(names)
         self._grow(n)
-        starts, ends = self._conditions(fleet)
+        starts, ends = conditions(self.rule, fleet)
         on, pending = self._on[:n], self._pending_ns[:n]
         begins = starts & ~on & concerned([self.rule], self._groups, names)[:, 0]
         pending[~begins] = 0
@@ -64,16 +80,6 @@ class TagWatch:
         changes = [TagChange(place, True, int(pending[place])) for place in begun.tolist()]
         on[begun], on[ended], pending[begun] = True, False, 0
         return changes + [TagChange(place, False, now_ns) for place in ended.tolist()]
-
-    def _conditions(self, fleet: FleetState) -> tuple[Array, Array]:
-        """Return for which tags the condition holds, and for which it surely does not."""
-        match self.rule:
-            case BatteryLowRule(fraction=limit):
-                return fleet.battery < limit, fleet.battery > limit + RECHARGED
-            case LostRule():
-                return fleet.state == State.LOST, (fleet.state >= 0) & (fleet.state != State.LOST)
-            case AmbiguousRule():
-                return fleet.state == State.AMBIGUOUS, fleet.state == State.TRACKING
 
     def _grow(self, tags: int) -> None:
         if tags > len(self._on):

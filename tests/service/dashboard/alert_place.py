@@ -5,7 +5,7 @@ import time
 from dataclasses import replace
 
 from dropanchor_schemas.destinations import EmailDestination
-from dropanchor_schemas.events import EventType
+from dropanchor_schemas.zones import EventType
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.delivery.channels import Channels
 from dropanchor_service.delivery.registry import addressees

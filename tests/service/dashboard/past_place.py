@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
-from dropanchor_schemas.events import EventType
+from dropanchor_schemas.zones import EventType
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.estimation.columns import Frame, State

@@ -4,7 +4,7 @@ import ipaddress
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Locator, expect
+from playwright.sync_api import Browser, Locator, Page, Route, expect
 
 from dropanchor_schemas.destinations import EmailDestination, MqttPosesDestination, WebhookDestination
 from dropanchor_schemas.zones import BatteryLowRule, Severity, TooCloseRule
@@ -171,31 +171,47 @@ def check_poses(place: ZonePlace, alerts: Locator) -> None:
     assert (made.deadband_m, made.interval_s, made.discovery, made.enabled) == (0.5, 1.0, "", True)
 
 
+def with_another_rule(page: Page) -> None:
+    """Let the page hear of a rule that its code does not know, and not at once of what it may do."""
+
+    def answer(route: Route) -> None:
+        schema = route.fetch().json()
+        schema["$defs"]["ParkedRule"] = schema["$defs"]["LostRule"]
+        schema["discriminator"]["mapping"]["parked"] = "#/$defs/ParkedRule"
+        route.fulfill(json=schema)
+
+    page.route("**/schemas/event_rule.json", answer)
+    page.route("**/api/v1/access", lambda route: route.abort(), times=5)
+
+
 def test_rules_are_made_and_edited_and_those_of_zones_lead_to_the_zone(chromium: Browser) -> None:
     place = alert_place()
-    with served(place), watched_page(chromium, place.url) as page:
+    with served(place), watched_page(chromium, place.url, prepare=with_another_rule) as page:
         alerts = opened(page)
         expect(alerts.get_by_role("list", name="Rules")).to_contain_text("faster than 2 m/s")
-        alerts.get_by_role("button", name="New: too close").click()
+        alerts.get_by_role("button", name="New: parked").click()
+        expect(alerts.get_by_label("For at least").filter(visible=True)).to_have_value("60")
+        alerts.get_by_role("button", name="Cancel").click()
+        alerts.get_by_role("button", name="New: Tags too close").click()
         form = alerts.get_by_role("form", name="Rule", exact=True)
         form.get_by_label("Name").fill("Keep apart")
         form.get_by_label("Closer than").fill("2.5")
         form.get_by_label("Groups").fill("forklifts")
         form.get_by_role("button", name="Save rule").click()
-        expect(alerts.get_by_role("list", name="Rules")).to_contain_text("closer than 2.5 m")
+        expect(alerts.get_by_role("list", name="Rules")).to_contain_text("Closer than 2.5 m")
         made = place.parts.items.rules.all["keep-apart"]
         assert isinstance(made, TooCloseRule)
         assert (made.distance_m, made.delay_s, made.groups, made.name) == (2.5, 1.0, ["forklifts"], "Keep apart")
-        alerts.get_by_role("button", name="New: battery low").click()
+        alerts.get_by_role("button", name="New: Battery low").click()
         expect(form.get_by_label("Closer than")).to_be_hidden()
         form.get_by_label("Name").fill("Charge")
         form.get_by_label("Charge below").fill("0.3")
-        expect(form.get_by_label("It makes")).to_have_value("warning")
-        form.get_by_label("It makes").select_option("an alarm")
+        expect(form.get_by_label("It makes")).to_have_value("alarm")
+        form.get_by_label("It makes").select_option("a warning")
         form.get_by_role("button", name="Save rule").click()
         expect(form).to_be_hidden()
         assert place.parts.items.rules.all["charge"] == BatteryLowRule(
-            type="battery_low", id="charge", name="Charge", fraction=0.3, severity=Severity.ALARM
+            type="battery_low", id="charge", name="Charge", fraction=0.3, severity=Severity.WARNING
         )
         alerts.get_by_role("button", name="Edit Keep apart").click()
         expect(form.get_by_label("Closer than")).to_have_value("2.5")

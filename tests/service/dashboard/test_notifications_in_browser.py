@@ -50,7 +50,7 @@ def test_chosen_events_are_notified_and_a_click_shows_them(chromium: Browser, ya
         page.wait_for("document.querySelectorAll('#events li').length === 1")
         page.page.get_by_role("button", name="Display").click()
         assert page.page.evaluate("asked") == []
-        page.page.get_by_label("A tag leaves a zone").check()
+        page.page.locator("#notifications").get_by_label("Left a zone").check()
         page.page.keyboard.press("Escape")
         assert page.page.evaluate("asked") == [True]
         yard.go("cart-3", -10.0, -10.0)
@@ -64,7 +64,7 @@ def test_chosen_events_are_notified_and_a_click_shows_them(chromium: Browser, ya
         expect(page.page.locator("#detail h2")).to_have_text("cart-3")
         page.page.reload()
         page.page.get_by_role("button", name="Display").click()
-        expect(page.page.get_by_label("A tag leaves a zone")).to_be_checked()
+        expect(page.page.locator("#notifications").get_by_label("Left a zone")).to_be_checked()
         assert page.page.evaluate("asked") == []
         assert page.errors == []
 
@@ -76,7 +76,7 @@ def test_a_storm_of_events_makes_one_notification(chromium: Browser, yard: ZoneP
     with watched_page(chromium, yard.url, prepare=granting) as page:
         page.wait_for("dropanchor.events()")
         page.page.get_by_role("button", name="Display").click()
-        page.page.get_by_label("A tag enters a zone").check()
+        page.page.locator("#notifications").get_by_label("Entered a zone").check()
         yard.move(*tags, x=3.0, y=3.0)
         yard.watch.turn()
         page.wait_for(f"{SHOWN}.length > 0")
@@ -87,6 +87,6 @@ def test_a_storm_of_events_makes_one_notification(chromium: Browser, yard: ZoneP
 def test_a_refused_permission_is_explained_and_nothing_is_chosen(chromium: Browser, yard: ZonePlace) -> None:
     with watched_page(chromium, yard.url, prepare=denying) as page:
         page.page.get_by_role("button", name="Display").click()
-        page.page.get_by_label("A battery is low").click()
+        page.page.locator("#notifications").get_by_label("Battery low").click()
         expect(page.page.locator("#notifications [role='alert']")).to_contain_text("change that in its settings")
-        expect(page.page.get_by_label("A battery is low")).not_to_be_checked()
+        expect(page.page.locator("#notifications").get_by_label("Battery low")).not_to_be_checked()

@@ -19,7 +19,7 @@ PANELS = """{
     destination: {
         by: ["#alerts summary", "[data-type=email]"], shows: "[data-part=destination-form]", places: ["side"],
     },
-    rule: { by: ["#alerts summary", "[data-type=lost]"], shows: "[data-part=rule-form]", places: ["side"] },
+    rule: { by: ["#alerts summary", "[data-part=new-rule] button"], shows: "[data-part=rule-form]", places: ["side"] },
     measure: { by: ["#measure"], shows: "#measured", places: ["map"] },
 }"""
 CLOSE = """{
@@ -72,14 +72,15 @@ def test_every_panel_opens_from_every_other_and_asks_only_when_something_typed_w
             *("tag", "start", "anchors", "plans", "zone", "destination", "rule", "measure"),
             *("past", "heat", "figures", "display", "keys", "several", "trail"),
         }
+        expect(page.page.locator("[data-part=new-rule] button")).to_have_count(4)
         assert page.page.evaluate(WALK) == []
 
-        page.page.get_by_role("button", name="New: lost").click()
+        page.page.get_by_role("button", name="New: Tag lost").click()
         page.page.locator("#events summary").click()  # a list leaves a form that is in the lists
         assert page.page.evaluate(OPEN) == []
 
         page.page.locator("#alerts summary").click()
-        page.page.get_by_role("button", name="New: lost").click()
+        page.page.get_by_role("button", name="New: Tag lost").click()
         form = page.page.get_by_role("form", name="Rule")
         form.get_by_label("Name").fill("Lost carts")
         question = page.page.locator("#confirm")

@@ -6,8 +6,7 @@ import time
 import pytest
 from playwright.sync_api import Browser, expect
 
-from dropanchor_schemas.events import EventType
-from dropanchor_schemas.zones import Severity
+from dropanchor_schemas.zones import EventType, Severity
 from dropanchor_service.estimation.columns import State
 from dropanchor_service.events.drafts import Draft
 from service.dashboard.zone_place import ZonePlace, disc, served, zone_place
@@ -129,7 +128,7 @@ def test_events_are_found_by_tag_kind_zone_and_time_are_not_cut_and_are_saved(ch
             expect(lines).to_have_count(count)
         expect(older).to_be_hidden()
         form.get_by_role("searchbox", name="Tag").fill("CART-3")
-        form.get_by_label("Type").select_option("A tag leaves a zone")
+        form.get_by_label("Type").select_option("Left a zone")
         expect(lines).to_have_count(70)
         expect(lines.first).to_contain_text("cart-3 left press")
         expect(lines.first.locator("time")).to_have_attribute("title", re.compile("(UTC|GMT)"))

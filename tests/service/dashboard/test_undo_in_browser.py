@@ -147,7 +147,7 @@ def test_rules_destinations_tags_and_anchors_are_undone(chromium: Browser, yard:
         page.locator("#alerts summary").click()
         alerts = page.locator("#alerts")
 
-        alerts.get_by_role("button", name="New: too close").click()
+        alerts.get_by_role("button", name="New: Tags too close").click()
         rule = alerts.get_by_role("form", name="Rule", exact=True)
         rule.get_by_label("Name").fill("Apart")
         rule.get_by_role("button", name="Save rule").click()
@@ -159,7 +159,7 @@ def test_rules_destinations_tags_and_anchors_are_undone(chromium: Browser, yard:
         page.keyboard.press("Control+z")
         said(outcome, "Undone: Rule Apart changed.")
         assert rules.all["apart"].model_dump()["distance_m"] == 3.0
-        expect(alerts).to_contain_text("closer than 3 m")
+        expect(alerts).to_contain_text("Closer than 3 m")
         alerts.get_by_role("button", name="Edit Apart").click()
         rule.get_by_role("button", name="Delete…").click()
         page.get_by_role("button", name="Delete rule").click()

@@ -12,7 +12,8 @@ def test_the_buttons_for_something_new_have_the_names_that_the_guides_use() -> N
     named = {name for guide in GUIDES.glob("*.md") for name in re.findall(r"\*(New[ :][^*]+)\*", _text(guide))}
     texts = " ".join(map(_text, (DASHBOARD / "i18n" / "en").glob("*.js")))
     shown = set(re.findall(r"\": \"(New[ :][^\"]+)\"", texts))
-    assert named >= {"New webhook", "New: too close"}
+    shown |= {f"New: {kind}" for kind in re.findall(r"\"kind\.[^\"]+\": \"([^\"]+)\"", texts)}
+    assert named >= {"New webhook", "New: Tags too close"}
     assert named <= shown
 
 

@@ -12,7 +12,7 @@ import httpx
 import pytest
 
 from dropanchor_schemas.destinations import WebhookDestination
-from dropanchor_schemas.events import EventType
+from dropanchor_schemas.zones import EventType
 from dropanchor_service.delivery import queue
 from dropanchor_service.delivery.channel import Outcome, Verdict
 from dropanchor_service.delivery.signature import headers

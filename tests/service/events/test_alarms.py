@@ -8,11 +8,10 @@ import pytest
 from dropanchor_schemas.alarms import Acknowledgement
 from dropanchor_schemas.audit import Author
 from dropanchor_schemas.destinations import EmailDestination, MqttDestination
-from dropanchor_schemas.events import EventType
-from dropanchor_schemas.zones import EventRule, LostRule, Severity, TooCloseRule, Zone
+from dropanchor_schemas.zones import EventRule, EventType, LostRule, Severity, TooCloseRule, Zone
 from dropanchor_service.delivery.registry import addressees, open_destinations
 from dropanchor_service.delivery.sentences import sentence
-from dropanchor_service.delivery.words import WORDS
+from dropanchor_service.delivery.words import words_in
 from dropanchor_service.estimation.columns import State
 from dropanchor_service.events.alarms import CURRENT
 from support.events import EventBench, S, circle, make_older
@@ -120,8 +119,8 @@ def test_who_acknowledges_is_kept_and_told_and_the_alarm_goes_on(tmp_path: Path)
         "anna",
         "is charging",
     )
-    assert sentence(told, str, WORDS[EmailDestination.model_fields["language"].default]) == (
-        "Acknowledged for a: lost: lost (anna) is charging"
+    assert sentence(told, str, words_in(EmailDestination.model_fields["language"].default)) == (
+        "Acknowledged for a: Tag lost (lost) (anna) is charging"
     )
     assert bench.stay(1.0, "a", x=0.0) == ["alarm.over a"]
     assert bench.alarms(CURRENT) == []

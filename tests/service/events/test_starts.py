@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from dropanchor_schemas.destinations import MqttDestination
-from dropanchor_schemas.events import EventType, RetractionReason
-from dropanchor_schemas.zones import TooCloseRule
+from dropanchor_schemas.events import RetractionReason
+from dropanchor_schemas.zones import EventType, TooCloseRule
 from dropanchor_service.delivery.registry import addressees, open_destinations
 from dropanchor_service.events.drafts import Draft
 from dropanchor_service.events.stays import times_in_zones

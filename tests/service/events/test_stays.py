@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_schemas.events import EventType
 from dropanchor_schemas.site import TagSettings
+from dropanchor_schemas.zones import EventType
 from dropanchor_service.estimation.columns import State
 from dropanchor_service.events.database import Database
 from dropanchor_service.events.drafts import Draft, Stay

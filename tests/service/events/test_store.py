@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_schemas.events import EventType
-from dropanchor_schemas.zones import BatteryLowRule, TooCloseRule
+from dropanchor_schemas.zones import BatteryLowRule, EventType, TooCloseRule
 from dropanchor_service.events.database import FILE_NAME, VERSION, Database, EventFileError
 from dropanchor_service.events.deliveries import Deliveries
 from dropanchor_service.events.drafts import Draft

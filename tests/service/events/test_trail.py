@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_schemas.events import EventType
 from dropanchor_schemas.site import Anchor, Site, TagSettings
+from dropanchor_schemas.zones import EventType
 from dropanchor_service.events.database import Database
 from dropanchor_service.events.drafts import Draft
 from dropanchor_service.events.store import EventStore

@@ -8,13 +8,15 @@ from mimetypes import guess_type
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from pydantic import TypeAdapter
 from starlette.datastructures import Headers
 from starlette.middleware.gzip import GZipMiddleware
-from starlette.responses import RedirectResponse, Response
+from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Match, Mount, Route
 from starlette.staticfiles import NotModifiedResponse, PathLike, StaticFiles
 from starlette.types import ASGIApp, Scope
 
+from dropanchor_schemas.zones import EventRule
 from dropanchor_service.api.help.routes import help_routes
 from dropanchor_service.api.http.site_in_path import is_omlox
 from dropanchor_service.api.routes.page_bundle import PROGRAMS, bundle, last_change
@@ -86,11 +88,13 @@ ELSEWHERE = {"/openapi.json": "api/v1/openapi.json", "/api/v1/docs": "../../docs
 
 
 def page_mounts(dashboard: Path) -> list[BaseRoute]:
-    """Return the routes of the pages: the documentation, that of REST with its program, and last the dashboard."""
+    """Return the routes of the pages: documentation, that of REST, the schema of rules, last the dashboard."""
     swagger_ui = _Files(Path(str(files("fastapi_swagger.resources"))))
     leading = [_leading(path, to) for path, to in ELSEWHERE.items()]
     of_rest = Mount("/docs/swagger-ui", app=_compressed(swagger_ui), name="swagger-ui")
-    return [*leading, *help_routes(), of_rest, DashboardMount(dashboard)]
+    rules = JSONResponse(TypeAdapter(EventRule).json_schema(), headers={"cache-control": "no-cache"})
+    of_rules = Route("/schemas/event_rule.json", rules, methods=["GET"], include_in_schema=False)
+    return [*leading, *help_routes(), of_rest, of_rules, DashboardMount(dashboard)]
 
 
 def _leading(path: str, to: str) -> Route:

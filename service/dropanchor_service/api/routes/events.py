@@ -16,7 +16,8 @@ from fastapi import Depends, Header, Query, Request
 from pydantic import AfterValidator, BeforeValidator, Field
 from starlette.responses import Response, StreamingResponse
 
-from dropanchor_schemas.events import EventList, EventType
+from dropanchor_schemas.events import EventList
+from dropanchor_schemas.zones import EventType
 from dropanchor_service.api.formats.events import csv_lines
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.http.router import Router

@@ -3,15 +3,18 @@
 import { listLanguages } from "../i18n/document.js";
 import { begun, said } from "../i18n/said.js";
 import { language, t } from "../i18n/language.js";
+import { kind, kindOfRule, KINDS } from "../zones/words.js";
 import { shareToken } from "../data/shared.js";
 import { confirmed } from "../setup/confirm.js";
 import { AlertStore } from "./alert_store.js";
 import { DestinationList } from "./destination_list.js";
 import { ItemEditor } from "./item_editor.js";
 import { ItemForm } from "./item_form.js";
+import { button, element } from "./lines.js";
 import { NetworkList } from "./network_list.js";
 import { RuleList } from "./rule_list.js";
 import { SecretField, newSecret } from "./secret_field.js";
+import { ruleModels } from "./rule_models.js";
 import { stuckIn } from "./words.js";
 import { partOf } from "../page/parts.js";
 
@@ -24,17 +27,10 @@ const NEW_DESTINATIONS = {
   mqtt_poses: { enabled: true, zones: [], tags: [], type: "mqtt_poses", prefix: "dropanchor", discovery: "homeassistant", interval_s: 1, deadband_m: 0.1 },
 };
 const SEVERITIES = ["event", "warning", "alarm"];
-const FOR_ALL = { name: "", tags: [], groups: [] };
-/** @type {Record<string, Record<string, any>>} */
-const NEW_RULES = {
-  too_close: { ...FOR_ALL, severity: "alarm", type: "too_close", distance_m: 3, delay_s: 1 },
-  battery_low: { ...FOR_ALL, severity: "warning", type: "battery_low", fraction: 0.2 },
-  lost: { ...FOR_ALL, severity: "alarm", type: "lost", after_s: 60 },
-  ambiguous: { ...FOR_ALL, severity: "warning", type: "ambiguous", after_s: 120 },
-};
 
 export class Alerts {
   store = new AlertStore();
+  #isOffered = false;
 
   /** @param {HTMLDetailsElement} box @param {HTMLDialogElement} dialog @param {import("../data/connection.js").Connection} connection
    * @param {import("../zones/zones.js").Zones} zones @param {import("../data/changes.js").Changes} changes
@@ -52,8 +48,12 @@ export class Alerts {
     this.networks = new NetworkList(partOf(this.box, "networks"), store);
     for (const list of document.querySelectorAll("select[data-severities]")) list.append(...SEVERITIES.map((one) => new Option(t(`severity.${one}`), one)));
     this.#addForms();
-    this.#addPanel("destination", this.destinationEditor, (type) => ({ ...NEW_DESTINATIONS[type], ...(type === "webhook" ? { secret: newSecret() } : {}) }));
-    this.#addPanel("rule", this.ruleEditor, (type) => NEW_RULES[type]);
+    this.#addPanel("destination", this.destinationEditor);
+    for (const one of /** @type {NodeListOf<HTMLElement>} */ (partOf(this.box, "new-destination").querySelectorAll("button"))) {
+      const type = one.dataset.type ?? "";
+      one.addEventListener("click", () => this.#mayMake(type) && panels.open("destination", () => this.destinationEditor.begin({ ...NEW_DESTINATIONS[type], ...(type === "webhook" ? { secret: newSecret() } : {}) })));
+    }
+    this.#addPanel("rule", this.ruleEditor);
     for (const part of [store, this.destinationEditor, this.ruleEditor, zones.store]) part.addEventListener("change", () => this.#update());
     changes.addEventListener("done", (event) => /^(destinations|event-rules)\//.test(/** @type {CustomEvent} */ (event).detail) && store.refresh());
     connection.addEventListener("status", () => (connection.status === "live" ? store.start() : store.stop()));
@@ -61,6 +61,12 @@ export class Alerts {
 
   #addForms() {
     const { store } = this;
+    partOf(this.box, "kinds").append(...KINDS.map((type) => {
+      const label = element("label", "", "check");
+      label.append(Object.assign(document.createElement("input"), { name: "types", type: "checkbox", value: type }), ` ${kind(type)}`);
+      label.firstElementChild?.setAttribute("data-as", "choice");
+      return label;
+    }));
     listLanguages(/** @type {HTMLSelectElement} */ (partOf(this.box, "language")));
     const form = /** @type {HTMLFormElement} */ (partOf(this.box, "destination-form"));
     new ItemForm(form, this.destinationEditor, {
@@ -71,19 +77,29 @@ export class Alerts {
     new SecretField(form, this.destinationEditor);
     this.networks.offerIn(form, this.destinationEditor);
     new ItemForm(/** @type {HTMLFormElement} */ (partOf(this.box, "rule-form")), this.ruleEditor, {
-      title: ({ type }, isNew) => (isNew ? t("rule.new", { rule: t(`rule.${type}`) }) : t(`rule.${type}`)),
+      title: ({ type }, isNew) => (isNew ? t("rule.new", { rule: kindOfRule(type) }) : kindOfRule(type)),
       mayDelete: () => store.isAdmin,
       ask: () => this.confirm(t("rule.question"), t("rule.delete")),
     });
   }
 
-  /** Register a form, and the buttons that begin something new in it. @param {"destination" | "rule"} name @param {ItemEditor} editor
-   * @param {(type: string) => Record<string, any>} fresh */
-  #addPanel(name, editor, fresh) {
+  /** Register a form. @param {"destination" | "rule"} name @param {ItemEditor} editor */
+  #addPanel(name, editor) {
     this.panels.add(name, { isOpen: () => editor.item !== null, isUnsaved: () => editor.isUnsaved, saving: () => editor.saving.now, leave: () => editor.close() });
-    for (const one of /** @type {NodeListOf<HTMLElement>} */ (partOf(this.box, `new-${name}`).querySelectorAll("button"))) {
-      const type = one.dataset.type ?? "";
-      one.addEventListener("click", () => this.#mayMake(type) && this.panels.open(name, () => editor.begin(fresh(type))));
+  }
+
+  /** Offer the rules that the service knows, once it has said which. It is asked again when it has not. */
+  async #offerRules() {
+    if (this.#isOffered) return;
+    this.#isOffered = true;
+    try {
+      for (const { type, begin, fields } of await ruleModels()) {
+        const name = t("alerts.new_rule", { kind: kindOfRule(type) });
+        partOf(this.box, "new-rule").append(button(name, name, () => this.panels.open("rule", () => this.ruleEditor.begin(begin))));
+        partOf(this.box, "own-values").before(...fields);
+      }
+    } catch {
+      this.#isOffered = false;
     }
   }
 
@@ -99,6 +115,7 @@ export class Alerts {
 
   #update() {
     const { store } = this;
+    if (store.mayWrite) this.#offerRules();
     const stuck = stuckIn(store.states);
     const summary = partOf(this.box, "summary");
     summary.hidden = partOf(this.box, "who").hidden = shareToken !== null;

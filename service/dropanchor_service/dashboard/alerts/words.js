@@ -2,6 +2,7 @@
 
 import { age, distance, percent, speedLimit } from "../data/format.js";
 import { has, t } from "../i18n/language.js";
+import { kindOfRule } from "../zones/words.js";
 
 /** @typedef {import("../data/items.js").Item} Item */
 /** @typedef {{destination: Item, has_secret: boolean, pending: number, oldest_ns: number | null, dead: number, problem: string | null}} DestinationState */
@@ -24,11 +25,17 @@ export function stuckIn(states) {
   return states.reduce((sum, { pending, dead, problem }) => sum + dead + (problem === null ? 0 : pending), 0);
 }
 
+const SHARED = ["id", "name", "type", "severity", "tags", "groups", "muted_until_ns"];
+
+/** Return the names of the values that only some rules have. @param {object} rule or the schema of its values */
+export const ownValues = (rule) => Object.keys(rule).filter((name) => !SHARED.includes(name));
+
+/** Return a value with its unit. @param {string} name which ends with the unit @param {number} value */
+const measured = (name, value) => (name.endsWith("_m") ? distance(value, 4) : name.endsWith("_mps") ? speedLimit(value) : name.endsWith("_s") ? age(value) : percent(value));
+
 /** Return when a rule makes an event, and for whom. @param {Item} rule */
 export function ruleWords(rule) {
-  const key = `rule.words.${rule.type}`;
-  const { distance_m, delay_s, after_s, fraction } = rule;
-  const words = has(key) ? t(key, { distance: distance(distance_m ?? 0, 4), time: age(delay_s ?? after_s), share: percent(fraction) }) : rule.type;
+  const words = [kindOfRule(rule.type), ...ownValues(rule).map((name) => `${t(`rule.field.${name}`)} ${measured(name, rule[name])}`)].join(" · ");
   const who = [...rule.groups.map((/** @type {string} */ group) => t("rule.group", { group })), ...rule.tags];
   const made = rule.severity && rule.severity !== "event" ? ` → ${t(`severity.${rule.severity}`)}` : "";
   return t("rule.who", { rule: words + made, who: who.length === 0 ? t("rule.all") : who.join(", ") });

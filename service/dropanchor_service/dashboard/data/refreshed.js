@@ -21,7 +21,7 @@ export class Refreshed extends EventTarget {
   /** Request everything now and every few seconds, until `stop`. */
   async start() {
     this.stop();
-    this.scope = await getJson(api("access")).then(({ scope }) => scope, () => "none");
+    this.scope = "none";
     await this.#repeat();
   }
 
@@ -47,6 +47,7 @@ export class Refreshed extends EventTarget {
   async #repeat() {
     clearTimeout(this.#timer);
     this.#timer = setTimeout(() => this.#repeat(), PERIOD_MS);
+    if (this.scope === "none") this.scope = await getJson(api("access")).then(({ scope }) => scope, () => "none");
     await this.refresh();
   }
 }

@@ -32,7 +32,7 @@ export const isSi = units.length.factor === 1 && units.velocity.factor === 1;
 /** @param {HTMLInputElement} input @returns {Unit} */
 const unitOf = (input) => units[/** @type {Kind} */ (input.dataset.measure)];
 
-/** Write symbols into the elements that ask for them, and convert the limits of the fields that hold measures. @param {Document} page */
+/** Write symbols into the elements that ask for them, and convert the limits of the fields that hold measures. @param {ParentNode} page */
 export function installUnits(page) {
   for (const element of page.querySelectorAll("[data-unit]")) {
     element.textContent = units[/** @type {Kind} */ (/** @type {HTMLElement} */ (element).dataset.unit)].symbol;

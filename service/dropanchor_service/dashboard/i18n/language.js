@@ -26,6 +26,9 @@ const grouped = new Intl.NumberFormat(locale);
 /** Return whether the catalogue has a message. @param {string} key */
 export const has = (key) => key in messages;
 
+/** Return how the keys with this beginning go on, in the order of the catalogue. @param {string} beginning */
+export const keysAfter = (beginning) => Object.keys(messages).filter((key) => key.startsWith(beginning)).map((key) => key.slice(beginning.length));
+
 /** Return a message with its values. Numbers among them are written for the language. @param {string} key @param {Values} [values] */
 export function t(key, values = {}) {
   const message = messages[key];

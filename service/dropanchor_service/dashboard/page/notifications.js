@@ -2,7 +2,7 @@
 
 import { chosen, remember } from "../data/display.js";
 import { t } from "../i18n/language.js";
-import { clock, KINDS, sentence } from "../zones/words.js";
+import { clock, kind, KINDS, sentence } from "../zones/words.js";
 
 /** @typedef {import("../zones/words.js").ServiceEvent} ServiceEvent */
 
@@ -21,17 +21,17 @@ export class Notifications {
     this.pick = pick;
     this.problem = /** @type {HTMLElement} */ (box.querySelector('[data-part="problem"]'));
     const list = /** @type {HTMLElement} */ (box.querySelector('[data-part="kinds"]'));
-    list.append(...KINDS.map((kind) => this.#choice(kind)));
+    list.append(...KINDS.map((type) => this.#choice(type)));
     log.addEventListener("event", (event) => this.#take(/** @type {CustomEvent} */ (event).detail));
   }
 
-  /** @param {string} kind */
-  #choice(kind) {
+  /** @param {string} type */
+  #choice(type) {
     const label = document.createElement("label");
-    const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: this.#kinds.has(kind) });
-    box.addEventListener("change", () => this.#choose(kind, box));
+    const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: this.#kinds.has(type) });
+    box.addEventListener("change", () => this.#choose(type, box));
     label.className = "check";
-    label.append(box, ` ${t(`notify.${kind}`)}`);
+    label.append(box, ` ${kind(type)}`);
     return label;
   }
 

@@ -3,9 +3,7 @@
 import { t } from "../i18n/language.js";
 import { fieldOf, partOf } from "../page/parts.js";
 import { saveEvents } from "./found_events.js";
-import { KINDS, kind } from "./words.js";
-
-const MORE_KINDS = ["alarm.over", "alarm.acknowledged", "event.retracted"].map((name) => `dropanchor.${name}`);
+import { ALL_KINDS, kind } from "./words.js";
 
 /** @typedef {import("./found_events.js").Wanted} Wanted */
 
@@ -19,7 +17,7 @@ export class EventFilter extends EventTarget {
     this.form = form;
     this.fleet = fleet;
     this.zones = zones;
-    this.#list("type").append(...[...KINDS, ...MORE_KINDS].map((one) => new Option(kind(one), one)));
+    this.#list("type").append(...ALL_KINDS.map((one) => new Option(kind(one), one)));
     form.addEventListener("submit", (event) => event.preventDefault());
     form.addEventListener("change", () => this.dispatchEvent(new Event("change")));
     form.addEventListener("reset", () => queueMicrotask(() => this.dispatchEvent(new Event("change"))));

@@ -1,7 +1,7 @@
 /** Events and changes of zones in words, and times for people. */
 
 import { age, fixed, length, percent, speed } from "../data/format.js";
-import { has, t, timeText } from "../i18n/language.js";
+import { has, keysAfter, t, timeText } from "../i18n/language.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone @typedef {import("./zone_store.js").Shape} Shape */
 
@@ -20,10 +20,12 @@ import { has, t, timeText } from "../i18n/language.js";
  *   acknowledged_by?: string | null, note?: string | null}} data
  */
 
-/** The kinds of events that zones and rules make. */
-export const KINDS = [
-  "zone.enter", "zone.exit", "zone.dwell", "zone.speed", "tags.too_close", "tag.lost", "tag.ambiguous", "tag.battery_low",
-].map((name) => `dropanchor.${name}`);
+/** The kinds of events of a site, and those of them that zones and rules make. */
+export const ALL_KINDS = keysAfter("kind.").filter((type) => type !== "dropanchor.destination.test");
+export const KINDS = ALL_KINDS.filter((type) => /^dropanchor\.(zone|tags?)\./.test(type));
+
+/** Return the kind of event that a rule makes. @param {string} type of the rule */
+export const kindOfRule = (type) => kind(KINDS.find((one) => one.endsWith(`.${type}`)) ?? type);
 
 /** Return what happened, such as `cart-3 entered Yard`. @param {ServiceEvent} event */
 export function sentence({ type, subject, data }) {
@@ -32,13 +34,13 @@ export function sentence({ type, subject, data }) {
   return t(key, {
     tag: subject, place: data.name || data.zone || data.rule || "", other: data.other_tag ?? "",
     time: age((data.t_ns - data.since_ns) / 1e9), speed: speed(data.speed_mps, 1), distance: length(data.distance_m, 1),
-    battery: percent(data.battery_fraction), why: why(data.reason), before: kind(data.alarm_type),
+    battery: percent(data.battery_fraction), why: why(data.reason), before: kind(data.retracted_type ?? data.alarm_type),
     who: data.acknowledged_by ? `(${data.acknowledged_by})` : "", note: data.note ?? "",
   }).trim();
 }
 
 /** Return what kind of event this is, in words. @param {string | null} [type] */
-export const kind = (type) => (type && has(`notify.${type}`) ? t(`notify.${type}`) : type ?? "");
+export const kind = (type) => (type && has(`kind.${type}`) ? t(`kind.${type}`) : type ?? "");
 
 /** Return why an event is not true, in words. @param {string | null} [reason] */
 export const why = (reason) => (reason && has(`event.why.${reason}`) ? t(`event.why.${reason}`) : reason ?? "");

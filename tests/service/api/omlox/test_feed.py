@@ -7,8 +7,7 @@ from typing import Any
 
 import pytest
 
-from dropanchor_schemas.events import EventType
-from dropanchor_schemas.zones import TooCloseRule
+from dropanchor_schemas.zones import EventType, TooCloseRule
 from dropanchor_service.api.http.limits import GuardedProtocol
 from dropanchor_service.api.omlox.feed.topics import TOPICS
 from dropanchor_service.api.omlox.models import FeatureCollection, FenceEvent, Location, TrackableMotion

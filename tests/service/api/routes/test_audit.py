@@ -12,9 +12,9 @@ import pytest
 from fastapi import FastAPI
 
 from dropanchor_schemas.audit import AuditKind, AuditList
-from dropanchor_schemas.events import EventType
 from dropanchor_schemas.shares import ShareRequest
 from dropanchor_schemas.site import Georeference, TagSettings
+from dropanchor_schemas.zones import EventType
 from dropanchor_service.api.omlox.routes.fences import EXAMPLE as FENCE
 from dropanchor_service.api.routes import event_examples
 from dropanchor_service.delivery.event_parts import EventParts

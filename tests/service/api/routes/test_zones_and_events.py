@@ -10,7 +10,8 @@ from fastapi import FastAPI
 from prometheus_client import CollectorRegistry
 
 from dropanchor_schemas.alarms import AlarmList
-from dropanchor_schemas.events import Event, EventList, EventType
+from dropanchor_schemas.events import Event, EventList
+from dropanchor_schemas.zones import EventType
 from dropanchor_service.api import create_app
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.delivery.event_parts import EventParts

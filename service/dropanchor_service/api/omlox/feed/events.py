@@ -6,7 +6,7 @@ from typing import Any
 
 import orjson
 
-from dropanchor_schemas.events import EventType
+from dropanchor_schemas.zones import EventType
 from dropanchor_service.answers.answers import Answer
 from dropanchor_service.api.omlox.feed.messages import Params, allows
 from dropanchor_service.api.omlox.feed.positions import Project

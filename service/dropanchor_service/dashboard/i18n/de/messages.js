@@ -2,6 +2,7 @@
 
 import alarms from "./alarms.js";
 import alerts from "./alerts.js";
+import events from "./events.js";
 import find from "./find.js";
 import plans from "./plans.js";
 import keys from "./keys.js";
@@ -16,4 +17,4 @@ import service from "./service.js";
 import share from "./share.js";
 import trail from "./trail.js";
 
-export default { ...alarms, ...alerts, ...find, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...refusals, ...share, ...trail };
+export default { ...alarms, ...alerts, ...events, ...find, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...refusals, ...share, ...trail };
