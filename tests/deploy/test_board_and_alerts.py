@@ -13,6 +13,7 @@ import yaml
 from prometheus_client import CollectorRegistry, Metric, generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
+from dropanchor_service.api.help.rendering import page
 from dropanchor_service.metrics.cluster import ClusterGauges
 from dropanchor_service.metrics.node import LeaseGauges
 from support.service import ROOT, running_service
@@ -100,6 +101,15 @@ def test_the_check_fails_for_a_metric_that_does_not_exist(exposed: dict[str, dic
         test_every_metric_and_label_in_an_expression_exists('dropanchor_tags{state="asleep"}', exposed)
 
 
+def test_the_board_shows_the_services_that_somebody_chooses() -> None:
+    (variable,) = board()["templating"]["list"]
+    assert variable["query"] == f"label_values(dropanchor_tags_registered, {variable['name']})"
+    for panel in board()["panels"]:
+        for target in panel["targets"]:
+            for selector in selectors(promql.parse(target["expr"])):
+                assert 'instance=~"$instance"' in [f'{one.name}=~"{one.value}"' for one in selector.matchers.matchers]
+
+
 def test_every_alert_says_what_happened_and_what_to_do() -> None:
     names = [rule["alert"] for rule in rules()]
     assert len(set(names)) == len(names) >= 8
@@ -111,7 +121,11 @@ def test_every_alert_says_what_happened_and_what_to_do() -> None:
 
 def test_every_alert_names_its_section_in_the_runbook_and_no_section_is_left_over() -> None:
     for rule in rules():
-        assert rule["annotations"]["runbook"] == f"{RUNBOOK.relative_to(ROOT).as_posix()}#{rule['alert'].lower()}"
+        section = f"how-to/{RUNBOOK.name}#{rule['alert'].lower()}"
+        assert rule["annotations"]["runbook"] == f"{{{{ $externalLabels.service_url }}}}/help/{section}"
+        assert f'id="{rule["alert"].lower()}"' in page(f"how-to/{RUNBOOK.name}")
+    for file in ("prometheus.yml", "cluster.yml"):
+        assert yaml.safe_load((ALERTS.parent / file).read_text())["global"]["external_labels"]["service_url"]
     sections = re.findall(r"^## (\w+)$", RUNBOOK.read_text(), re.MULTILINE)
     assert sorted(sections) == sorted(rule["alert"] for rule in rules())
 
