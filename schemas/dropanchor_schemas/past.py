@@ -67,7 +67,9 @@ class Past(Frozen):
 class WhatIf(Exact):
     """Which minutes to run again, and what to change from their beginning on."""
 
-    from_ns: int = Field(ge=0, lt=2**62, description="UTC, ns. The tag goes on from where it was then.")
+    from_ns: int = Field(
+        ge=0, lt=2**62, description="UTC, ns. The tag goes on from where it was then, or last knew to be before."
+    )
     to_ns: int = Field(ge=0, lt=2**62, description="UTC, ns; at most half an hour later.")
     settings: TagSettings = Field(
         default=TagSettings(), description="Settings of the tag that differ; what is left out is as it was."

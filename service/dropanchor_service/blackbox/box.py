@@ -21,7 +21,7 @@ from dropanchor_service.runtime.background_writer import BackgroundWriter
 from dropanchor_service.runtime.helper_process import HelperProcess
 from dropanchor_service.store import Sites
 
-RUN_S = 60.0  # that a question may take
+RUN_S = 300.0  # that a question may take on a busy machine: what it may cost is limited by its CPU time
 WRITE_S = 10.0  # so much of it a kill can lose
 MAX_QUEUED_BYTES = 64 * 2**20
 MESSAGE_OVERHEAD = 150  # bytes of a queued message beside its payload

@@ -10,12 +10,10 @@ from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Site, StartPose, TagSettings
 from dropanchor_service.answers.explain import MINUTE_NS, explanation_of
 from dropanchor_service.blackbox.chosen import BoxError
-from dropanchor_service.blackbox.rerun import Rerun
-from dropanchor_service.estimation.columns import Frame, State
+from dropanchor_service.blackbox.rerun import Rerun, is_sure
 from dropanchor_service.recording.reading import Turn
 
 AFTER_NS = 10_000_000_000
-SURE_OF = (State.TRACKING, State.COASTING, State.DEGRADED)
 
 
 class Question(Exact):
@@ -57,8 +55,9 @@ def _explained(question: Question) -> dict[str, Any]:
 def _compared(question: Question, what: WhatIf) -> dict[str, Any]:
     period = question.folder, question.site, question.tag, what.from_ns, what.to_ns
     as_was, other = Rerun(*period), Rerun(*period)
+    as_was.run_to(what.from_ns)
+    other.run_to(as_was.sure_ns or what.from_ns)  # a tag that just did not know goes on from where it last did
     as_was.run_to(what.to_ns)
-    other.run_to(what.from_ns)
     began = _change(other, question.tag, what)
     other.run_to(what.to_ns, adopt=False)
     tracks = [run.track(what.from_ns, what.to_ns) for run in (as_was, other)]
@@ -76,7 +75,10 @@ def _last_place(track: dict[str, list[Any]]) -> tuple[float, float]:
 
 
 def _change(run: Rerun, name: str, what: WhatIf) -> bool:
-    """Change the settings of a run. The tag goes on from where it is; return whether it knows that."""
+    """Change the settings of a run, whose tag goes on from where it is. Return whether it knows that.
+
+    What already is as asked changes nothing: then the run tells what would have been without the changes that follow.
+    """
     site, now_ns = run.service.site, run.service.clock.now_ns()
     before = site.tag_settings(name)
     after = what.settings.over(before)
@@ -86,7 +88,10 @@ def _change(run: Rerun, name: str, what: WhatIf) -> bool:
     update: dict[str, Any] = {"anchors": [*anchors, *changed.values()]}
     if what.declination_rad is not None:
         update["declination_rad"] = what.declination_rad
-    site.set_site(Site.model_validate(site.site.model_dump() | update))
+    changed_site = Site.model_validate(site.site.model_dump() | update)
+    if (after, changed_site) == (before, site.site):
+        return start is not None
+    site.set_site(changed_site)
     run.service.take(Turn(now_ns))  # the engine follows the site first, which may move the track
     site.set_tag(name, after.model_copy(update={"start": start}))
     return start is not None
@@ -95,10 +100,8 @@ def _change(run: Rerun, name: str, what: WhatIf) -> bool:
 def _place_of(run: Rerun, before: TagSettings, after: TagSettings) -> StartPose | None:
     """Return where the tag is, as a start; None if it does not know. Its body turns against an unchanged course."""
     pose = None if run.row is None else run.service.latest.row(run.row)
-    if pose is None or pose["state"] not in SURE_OF or pose["frame"] == Frame.RELATIVE:
+    if pose is None or not is_sure(pose):
         return None
     x, y, heading = (float(pose[name]) for name in ("x", "y", "heading"))
-    if not math.isfinite(x + y + heading):
-        return None
     turned = (after.mount_angle_rad or 0.0) - (before.mount_angle_rad or 0.0)
     return StartPose(x=x, y=y, heading_rad=heading - turned, std_m=max(float(pose["sigma_pos"]), 0.1))

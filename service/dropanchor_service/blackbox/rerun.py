@@ -17,19 +17,21 @@ from dropanchor_service.answers.frames import STATES, in_site_frame
 from dropanchor_service.blackbox.chosen import BoxError, chosen, turns_of
 from dropanchor_service.checkpoints.format import CheckpointError
 from dropanchor_service.checkpoints.snapshot import ServiceState
-from dropanchor_service.estimation.columns import POSE, Array
+from dropanchor_service.estimation.columns import POSE, Array, Frame, State
 from dropanchor_service.offline.recorded_turns import OfflineService, settings_of
 from dropanchor_service.recording.reading import Turn
 from dropanchor_service.settings.model import Settings
 
 MOST_INCIDENTS = 200
 SECOND_NS = 1_000_000_000
+SURE_OF = (State.TRACKING, State.COASTING, State.DEGRADED)
 
 
 class Rerun:
     """A tag of a site, and what becomes of it. `run_to` goes on from where the last one ended.
 
-    poses: POSE of the run. states: time, state and reason where they changed. incidents: what happened to its samples.
+    poses: POSE of the run. sure_ns: when the tag last knew where it is, None if it never did. states: time, state and
+    reason where they changed. incidents: what happened to its samples.
     Creating it raises BoxError.
     """
 
@@ -48,6 +50,7 @@ class Rerun:
             raise BoxError(sentence) from error
         self._name = tag
         self.poses: list[Array] = []
+        self.sure_ns: int | None = None
         self.states: list[tuple[int, str, str]] = []
         self.incidents: deque[dict[str, Any]] = deque(maxlen=MOST_INCIDENTS)
         self._counts = self._counted()
@@ -96,6 +99,8 @@ class Rerun:
         if len(own):
             self.poses.append(own.copy())
             self._note_state(own[-1])
+            if is_sure(own[-1]):
+                self.sure_ns = turn.t_ns
         self._note_incidents(turn.t_ns)
 
     def _note_state(self, pose: Array) -> None:
@@ -139,3 +144,9 @@ class Rerun:
 
 def _value(counter: PrometheusCounter) -> int:
     return int(next(iter(counter.collect())).samples[0].value)
+
+
+def is_sure(pose: Array) -> bool:
+    """Return whether the tag knows where it is on the map, and which way it faces."""
+    is_placed = pose["state"] in SURE_OF and pose["frame"] != Frame.RELATIVE
+    return bool(is_placed and np.isfinite(pose["x"] + pose["y"] + pose["heading"]))

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable
+from math import dist
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ from dropanchor_service.estimation.columns import POSE, Array
 from dropanchor_service.ingest.observers import Observers
 from dropanchor_service.recording.reading import RecordingReader
 from dropanchor_service.settings.sources import load_settings
+from dropanchor_tag_client.simulator.live import simulation
+from dropanchor_tag_client.simulator.sensors import preset
 from service.data_folder import full_disk
 from support.ingest import IngestBench
 from support.manual_clock import ManualClock
@@ -33,6 +36,7 @@ from support.traffic import T0_NS, known_starts, traffic
 S = 1_000_000_000
 TAG, OTHER = "sim-2", "sim-1"
 LIMITS = Limits(2**40, 10**18)
+RUNS = ("as_was", "what_if")
 RENAMED_NS, MOVED_NS, END_NS = T0_NS + 66 * S, T0_NS + 70 * S, T0_NS + 75 * S
 
 
@@ -90,7 +94,7 @@ def filled(tmp_path_factory: pytest.TempPathFactory) -> Boxed:
         if t_ns == RENAMED_NS:
             boxed.bench.site.set_tag(TAG, boxed.bench.site.tag_settings(TAG).model_copy(update={"name": "Anna's cart"}))
         if t_ns == MOVED_NS:
-            boxed.bench.site.set_anchor(Anchor(id="1", x=0.5))
+            boxed.bench.site.set_anchor(Anchor(id="1", x=8.0))
         if t_ns % (10 * S) == 0:
             boxed.write()
     boxed.write()
@@ -143,6 +147,18 @@ def test_a_run_with_other_settings_goes_on_from_where_the_tag_was_and_changes_no
     first = [moved[name]["x"][0] - moved["as_was"]["x"][0] for name in ("what_if",)]
     assert abs(first[0]) < 2.0
     assert filled.bench.site.document is document
+
+
+def test_a_run_without_a_change_ends_where_the_tag_truly_was_and_begins_where_it_last_knew_that(filled: Boxed) -> None:
+    def asked(from_ns: int) -> dict[str, Any]:
+        what = WhatIf(from_ns=from_ns, to_ns=END_NS, anchors=[Anchor(id="1")])
+        return answer_to(Question(folder=filled.box.folder, site="default", tag=TAG, what_if=what))
+
+    truth, run = simulation("yard", 1, 1, preset("calibrated"), 75.0).truth, asked(MOVED_NS - S)
+    was, other = (dist([run[name][axis][-1] for axis in "xy"], (truth.x[-1], truth.y[-1])) for name in RUNS)
+    assert other < 0.5 < 3.0 < was
+    assert run["as_was"]["state"][-1] == "ambiguous"
+    assert asked(END_NS - S)["began_at_pose"]
 
 
 def test_samples_come_as_a_recording_and_as_a_table_without_names_if_nobody_shall_know_them(
