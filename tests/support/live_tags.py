@@ -28,7 +28,7 @@ class LiveTags:
     """Tags of the scenario "yard" with known starts that publish from `start` until `finish`.
 
     boot_clock: their clocks count from half an hour before the start.
-    samples: number of samples published so far, by tag and kind.
+    samples: number of samples published so far, by tag and kind. clock_ns: how far the clock of a tag is ahead.
     """
 
     def __init__(
@@ -53,6 +53,7 @@ class LiveTags:
         self._clients = ExitStack()
         self._thread = Thread(target=self._run, daemon=True)
         self.samples: dict[str, Counter[str]] = defaultdict(Counter)
+        self.clock_ns: dict[str, int] = defaultdict(int)
 
     def write_settings(self, folder: Path, *more: str) -> Path:
         """Write a settings file with the anchor and the start of each tag. more: further lines at its top."""
@@ -123,10 +124,11 @@ class LiveTags:
 
     def _publish(self, delivery: Delivery) -> None:
         client = self._opened[delivery.tag]
+        ahead_ns = self.clock_ns[tag_name(delivery.tag)] - self._booted_ns
         for imu in delivery.imu:
-            client.publish_imu(imu.acc, imu.gyro, imu.mag, t_ns=imu.t_ns - self._booted_ns)
+            client.publish_imu(imu.acc, imu.gyro, imu.mag, t_ns=imu.t_ns + ahead_ns)
         for sample in delivery.ranges:
-            client.publish_range(sample.anchor, sample.range_m, t_ns=sample.t_ns - self._booted_ns, std_m=sample.std_m)
+            client.publish_range(sample.anchor, sample.range_m, t_ns=sample.t_ns + ahead_ns, std_m=sample.std_m)
         client.flush()
         self._sent += 1
         self.samples[tag_name(delivery.tag)].update(imu=len(delivery.imu), range=len(delivery.ranges))

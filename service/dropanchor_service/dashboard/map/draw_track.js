@@ -1,13 +1,15 @@
 /** Draw the stored track of a tag over a longer time: dashed where it is doubtful, faint dots where the line is only a sketch of it, broken where nothing is known. */
 
 import { DOUBTFUL, TRACKING } from "../data/packed_tracks.js";
+import { haloStroke } from "./draw_site.js";
 
 /** A line is drawn as one where no stored pose is farther from it. */
 const SKETCH_PX = 1;
+const RING_PX = 7;
 
-/** @typedef {import("../data/tracks.js").Track} Track @typedef {import("./scene.js").Scene} Scene */
+/** @typedef {Pick<import("../data/tracks.js").Track, "time" | "x" | "y" | "since" | "off_m">} Line @typedef {import("./scene.js").Scene} Scene */
 
-/** @param {Scene} scene @param {Track} track @param {string} [colour] of the tag; empty: none */
+/** @param {Scene} scene @param {Line} track @param {string} [colour] of the tag; empty: none */
 export function drawTrack({ ctx, view, palette }, track, colour = "") {
   ctx.strokeStyle = colour || palette.accent;
   ctx.lineWidth = 1.5;
@@ -26,4 +28,15 @@ export function drawTrack({ ctx, view, palette }, track, colour = "") {
   }
   ctx.setLineDash([]);
   ctx.globalAlpha = 1;
+}
+
+/** Draw where a tag would have been, with a ring at a time. @param {Scene} scene @param {Line} line @param {number} time_ms */
+export function drawOther(scene, line, time_ms) {
+  const { ctx, view, palette } = scene;
+  drawTrack(scene, line, palette.warning);
+  const at = line.time.findLastIndex((one) => one <= time_ms);
+  if (at < 0 || Number.isNaN(line.x[at])) return;
+  ctx.beginPath();
+  ctx.arc(view.screenX(line.x[at]), view.screenY(line.y[at]), RING_PX, 0, 2 * Math.PI);
+  haloStroke(ctx, palette, palette.warning, 3);
 }

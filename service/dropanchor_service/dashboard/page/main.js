@@ -79,7 +79,7 @@ table.isElsewhere = (/** @type {number} */ row) => map.isElsewhere(row);
 const edges = new EdgeHints(byId("edges"), map);
 const measure = new Measure(map, byId("measure"), byId("measured"), panels);
 map.pressed = (/** @type {number} */ px, /** @type {number} */ py) => measure.press(px, py) || zones.press(px, py);
-const past = new Past({ fleet, trails, roster, evidence, map, choice, connection, panels, updatePanels, byId });
+const past = new Past({ fleet, trails, roster, evidence, map, choice, connection, changes: setup.changes, panels, updatePanels, byId });
 detail.heights.floors = () => plans.floors.all;
 detail.heightsInPast = (/** @type {string} */ tag) => past.heightsOf(tag);
 const zones = new Zones(map, connection, setup.changes, (tag) => fleet.row(tag) >= 0 && select(tag), panels);

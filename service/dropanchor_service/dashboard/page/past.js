@@ -35,6 +35,7 @@ const ADDRESS_MS = 1000;
  * @property {import("./choice.js").Choice} choice
  * @property {import("../data/connection.js").Connection} connection
  * @property {import("./one_panel.js").Panels} panels
+ * @property {import("../data/changes.js").Changes} changes
  * @property {() => void} updatePanels
  * @property {(id: string) => HTMLElement} byId
  */
@@ -58,7 +59,7 @@ export class Past {
     this.lane = new Lane(page.byId("lane"), this.replay);
     this.replay.afterPause = (time_ms) => (this.bar.skips ? afterPause([...gapsBetween(this.#times.stretches ?? []), ...this.lane.stops], time_ms) : time_ms);
     this.figures = new PastFigures(page.byId("past-figures"), this.replay, page.choice);
-    new Then(page.byId("then"), this.replay, page.choice);
+    new Then(page.byId("then"), this.bar, page.choice, page.map, page.changes);
     this.heat = new HeatPanel(this.bar.heatButton, page.byId("heat"), page.map, this.replay, page.choice);
     new FiguresPanel(this.bar.figuresButton, /** @type {HTMLDialogElement} */ (page.byId("figures")), this.replay, page.choice, page.fleet, page.panels);
     page.map.trackOf = (tag) => this.#trackOf(tag);

@@ -95,10 +95,10 @@ export class PastBar extends EventTarget {
     this.update();
   }
 
-  /** Mark times on the strip below the slider. @param {number[]} times ms */
-  mark(times) {
+  /** Mark times on the strip below the slider. @param {"events" | "changes"} what @param {number[]} times ms */
+  mark(what, times) {
     const shown_ms = (this.replay.to_ms - this.replay.from_ms) / 250; // less would not be seen
-    partOf(this.bar, "events").setAttribute("d", stripPath(times.map((time_ms) => ({ from_ms: time_ms, to_ms: time_ms + shown_ms })), this.replay));
+    partOf(this.bar, what).setAttribute("d", stripPath(times.map((time_ms) => ({ from_ms: time_ms, to_ms: time_ms + shown_ms })), this.replay));
   }
 
   #showPeriod() {

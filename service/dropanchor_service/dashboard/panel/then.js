@@ -1,4 +1,4 @@
-/** Why the selected tag was where it was at the shown time: what the black box says, and who had changed what. */
+/** Why the selected tag was where it was at the shown time: who had changed what, what the black box says, and what if not. */
 
 import { request } from "../data/access.js";
 import { api, getJson } from "../data/connection.js";
@@ -10,6 +10,7 @@ import { differences } from "../data/trail.js";
 import { t, timeText } from "../i18n/language.js";
 import { refusal } from "../i18n/said.js";
 import { partOf } from "../page/parts.js";
+import { WhatIf } from "./what_if.js";
 
 const BEFORE_MS = 120_000;
 const DAY_MS = 86_400_000;
@@ -18,25 +19,33 @@ const KINDS = ["anchor", "site", "tag"];
 /** @type {Record<string, string>} */
 const INCIDENTS = { rejected: "then.rejected", clock_jump: "then.clock_jump", restart: "then.restart", missing: "then.missing" };
 
-/** @typedef {{t_ns: number, kind: string, reason: string | null, count: number}} Incident */
+/** @typedef {{t_ns: number, kind: string, reason: string | null, count: number}} Incident @typedef {import("../data/trail.js").Entry} Entry */
 
 export class Then {
   #asked = ""; // what is shown or under way
 
-  /** @param {HTMLElement} box @param {import("../data/replay.js").Replay} replay @param {import("../page/choice.js").Choice} choice */
-  constructor(box, replay, choice) {
+  /** The tag and the time whose changes are shown. */
+  #listed = "";
+
+  /** @param {HTMLElement} box @param {import("./past_bar.js").PastBar} bar @param {import("../page/choice.js").Choice} choice
+   * @param {import("../map/map.js").LiveMap} map @param {import("../data/changes.js").Changes} changes */
+  constructor(box, bar, choice, map, changes) {
     this.box = box;
-    this.replay = replay;
+    this.bar = bar;
+    this.replay = bar.replay;
     this.choice = choice;
+    this.whatIf = new WhatIf(/** @type {HTMLFormElement} */ (partOf(box, "what-if")), bar.replay, choice, map, changes);
     partOf(box, "explain").addEventListener("click", () => this.#explain());
     partOf(box, "save").addEventListener("click", () => this.#save());
     choice.addEventListener("change", () => this.update());
-    replay.addEventListener("period", () => this.update());
+    bar.replay.addEventListener("period", () => this.update());
   }
 
   update() {
     this.box.hidden = !this.replay.figures.get(this.choice.selected)?.figure;
     this.#say("", []);
+    this.whatIf.clear();
+    if (!this.box.hidden) this.#list();
   }
 
   get #tag() {
@@ -48,8 +57,8 @@ export class Then {
     const asked = (this.#asked = `${this.#tag} ${at_ms}`);
     this.#say(t("then.running"), []);
     try {
-      const [explanation, trail] = await Promise.all([this.#explanation(at_ms), this.#trail(at_ms)]);
-      if (asked === this.#asked) this.#say(stateText(explanation.pose), [...incidents(explanation.past), ...states(explanation.past), ...this.#changes(trail)]);
+      const { pose, past } = await this.#explanation(at_ms);
+      if (asked === this.#asked) this.#say(stateText(pose), [...incidents(past), ...states(past)]);
     } catch (error) {
       if (asked === this.#asked) this.#say(refusal(error), []);
     }
@@ -61,19 +70,32 @@ export class Then {
     return (await request(url, {})).json(); // a run takes some seconds
   }
 
-  /** @param {number} at_ms */
-  #trail(at_ms) {
-    return getJson(api(`audit?from=${nanoseconds(at_ms - DAY_MS)}&to=${nanoseconds(at_ms)}&kind=${KINDS.join()}`));
+  /** List who changed what of the tag, the anchors and the site in the period and the day before, and mark it on the time line. */
+  async #list() {
+    const { from_ms, to_ms } = this.replay;
+    const tag = this.choice.selected;
+    const listed = (this.#listed = `${tag} ${from_ms} ${to_ms}`);
+    /** @type {{entries: Entry[]}} */
+    const { entries } = await getJson(api(`audit?from=${nanoseconds(to_ms - DAY_MS)}&to=${nanoseconds(to_ms)}&kind=${KINDS.join()}`)).catch(() => ({ entries: [] }));
+    if (listed !== this.#listed) return;
+    const own = entries.filter(({ kind, item }) => kind !== "tag" || item === tag);
+    this.bar.mark("changes", own.map(({ t_ns }) => t_ns / 1e6));
+    partOf(this.box, "changes").replaceChildren(...own.slice(0, MOST).map((entry) => this.#change(entry)));
   }
 
-  /** @param {{entries: import("../data/trail.js").Entry[]}} trail */
-  #changes({ entries }) {
-    return entries.filter(({ kind, item }) => kind !== "tag" || item === this.choice.selected).slice(0, MOST).map((entry) => t("then.change", {
+  /** @param {Entry} entry */
+  #change(entry) {
+    const line = document.createElement("li");
+    const text = t("then.change", {
       time: timeOf(entry.t_ns),
       who: entry.by.name || t(`trail.by_${entry.by.source}`),
       item: entry.item,
       what: differences(entry.before ?? {}, entry.after ?? {}).map(([name, before, after]) => `${name}: ${JSON.stringify(before) ?? "–"} → ${JSON.stringify(after) ?? "–"}`).join(", "),
-    }));
+    });
+    line.append(button(text, () => this.replay.seek(entry.t_ns / 1e6)));
+    const other = withoutIt(entry);
+    if (other) line.append(" ", button(t("whatif.not"), () => this.whatIf.run(other, entry.t_ns / 1e6 - 1000)));
+    return line;
   }
 
   async #save() {
@@ -96,13 +118,34 @@ export class Then {
   }
 }
 
+/** Return what takes a change back; null where a run cannot. @param {Entry} entry */
+function withoutIt({ kind, before, after }) {
+  if (before === null || after === null || kind === "site") return null;
+  if (kind === "anchor") return { anchors: [before] };
+  return { settings: Object.fromEntries(differences(before, after).map(([name, value]) => [name, value ?? null])) };
+}
+
+/** @param {string} text @param {() => void} act */
+function button(text, act) {
+  const made = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: text });
+  made.addEventListener("click", act);
+  return made;
+}
+
 /** @param {{state: string, reason: string}} pose */
 const stateText = ({ state, reason }) => `${STATES[stateNumber(state)].label}: ${words(reason)}`;
 
-/** @param {{incidents: Incident[]}} past */
-const incidents = (past) => past.incidents.slice(-MOST).map(({ t_ns, kind, reason, count }) => (
-  t(INCIDENTS[kind], { time: timeOf(t_ns), n: count, reason: reason ? words(reason) : "" })
-));
+/** Return a line for each thing that happened, with when it did first: a clock jumps once, among hundreds of late samples.
+ * @param {{incidents: Incident[]}} past */
+function incidents(past) {
+  /** @type {Map<string, Incident>} */
+  const found = new Map();
+  for (const one of past.incidents) {
+    const what = `${one.kind} ${one.reason}`;
+    found.set(what, { ...one, t_ns: found.get(what)?.t_ns ?? one.t_ns, count: one.count + (found.get(what)?.count ?? 0) });
+  }
+  return [...found.values()].map(({ t_ns, kind, reason, count }) => t(INCIDENTS[kind], { time: timeOf(t_ns), n: count, reason: reason ? words(reason) : "" }));
+}
 
 /** @param {{states: {t_ns: number, state: string, reason: string}[]}} past */
 const states = (past) => past.states.slice(-MOST).map((one) => t("then.state", { time: timeOf(one.t_ns), state: stateText(one) }));

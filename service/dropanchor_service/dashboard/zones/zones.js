@@ -97,7 +97,7 @@ export class Zones {
   /** List the events of the past, which a click leads to, or those of the present. @param {import("../page/past.js").Past} past */
   follow(past) {
     past.replay.addEventListener("period", () => this.#find());
-    this.found.addEventListener("change", () => this.replay && past.bar.mark(this.found.times));
+    this.found.addEventListener("change", () => this.replay && past.bar.mark("events", this.found.times));
     past.became = (isPast) => {
       this.replay = isPast ? past.replay : null;
       this.#find();
