@@ -50,13 +50,11 @@ def test_with_a_barometer_a_climb_costs_nothing_and_its_height_is_known(
     place, heights = scores(runs, climb, Barometer())
     # Ten metres up and down, near the anchor: the temperature of the air, which nobody told, is part of the error.
     allowed = 1.5 if climb == "sine 10 m" else 1.1
-    assert place.second_half[0] < allowed * level.second_half[0]
     assert place.worst_sigma < 5.5
     assert place.coverage > 0.95
     assert np.mean([one.coverage for one in heights]) > 0.93
-    if (
-        climb not in AT_ONCE
-    ):  # a height that changes at once is seen by the next pressure, and believed after two seconds
+    if climb not in AT_ONCE:  # what jumps may be the air, and is half believed
+        assert place.second_half[0] < allowed * level.second_half[0]
         assert max(one.worst_sigma for one in heights) < 5.0
         assert np.median([one.rmse for one in heights]) < 0.5
 

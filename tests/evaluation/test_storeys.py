@@ -31,7 +31,7 @@ def test_the_floor_is_right_five_seconds_after_a_change(runs: list[TagRun], heig
     found = floors(runs, height)
     assert found.settled > 0.5 * found.poses
     assert found.right >= 0.97 * found.settled  # on stairs a tag passes the height of a floor for some seconds
-    assert found.believed > 0.85 * found.poses
+    assert found.believed > 0.8 * found.poses  # while it climbs, the barometer may be late
     assert found.wrong <= 0.002 * found.poses  # of which all are within 0.3 m of the floor between two storeys
 
 

@@ -7,6 +7,9 @@ air and L the logarithm of the pressure of a reference, or of the tag's first sa
 
     z' = z + w dt        w is a Gauss-Markov process        b is a random walk: the weather, and drift of the sensor
 
+A pressure that jumps is height or air, and nothing here tells which: both become as unsure as it jumps, and share it.
+That a barometer is late is an error of its speed times the delay.
+
 A reference is a tag whose barometer does not move: its b is the weather, which is taken out of y. A tag that is told to
 be flat has no filter, nor has one that is told nothing and sends no pressure.
 """
@@ -36,7 +39,8 @@ DRIFT_REFERRED: Final = 0.15**2 / 600.0  # m^2/s, the same with one: two sensors
 HEIGHT_BOUND: Final = 10.0  # m, the largest standard deviation of a height: that of a tag of which nobody knows it
 REFERENCE_S: Final = 30.0  # s without a pressure after which a reference has died: its last level is kept
 JUMP_GATE: Final = 5.0  # standard deviations: an innovation beyond is in doubt
-DOUBT_S: Final = 2.0  # s after which it is believed: a door slams for 1 s, and a lift takes longer
+DOUBT_S: Final = 2.0  # s after which it has jumped: a door slams for 1 s, and a lift takes longer
+LATE_STD: Final = 1.5  # s, of how late a barometer is: behind a vent, or filtered
 MAX_STEP_S: Final = 1.0  # s of prediction at once
 FORGOTTEN_S: Final = 100.0  # s without a sample after which nothing is known but the bound
 
@@ -107,7 +111,8 @@ def height_at(h: Height, t_ns: int, node: Node) -> None:
     air_std = TOLD_AIR_STD if h.air_told == 1 else AIR_STD
     scale = air_std / STANDARD_AIR * (h.x[0] - h.told) if h.fed == 1 else 0.0
     node.height = h.x[0]
-    node.height_std = math.sqrt(h.P[0, 0] + h.doubt * h.doubt + scale * scale)
+    late = LATE_STD * h.x[1] if h.fed == 1 else 0.0
+    node.height_std = math.sqrt(h.P[0, 0] + h.doubt * h.doubt + scale * scale + late * late)
     node.height_source = BY_PRESSURE if h.fed == 1 else UNKNOWN
 
 
@@ -178,7 +183,7 @@ def _predict(h: Height, dt: float) -> None:
 
 @njit(nogil=True)
 def _update(h: Height, t_ns: int, y: float) -> int:
-    """Update with y = z + b, unless it is in doubt. Of what lasts, z takes all: it is no noise."""
+    """Update with y = z + b, unless it is in doubt. What has jumped may be of z or b; of a reference, it is of b."""
     x, P = h.x, h.P
     e = y - x[0] - x[2]
     S = P[0, 0] + 2.0 * P[0, 2] + P[2, 2] + NOISE_STD**2
@@ -188,9 +193,11 @@ def _update(h: Height, t_ns: int, y: float) -> int:
         h.doubt = e
         if (t_ns - h.doubt_ns) * 1e-9 < DOUBT_S:
             return DOUBTED
-        lasting = 2 if h.motion == REFERENCE else 0
-        P[lasting, lasting] += e * e
-        S += e * e
+    if h.doubt != 0.0:
+        of_height = 0.0 if h.motion == REFERENCE else e * e
+        P[0, 0] += of_height
+        P[2, 2] += e * e
+        S += of_height + e * e
     h.doubt = 0.0
     g0, g1, g2 = (P[0, 0] + P[0, 2]) / S, (P[1, 0] + P[1, 2]) / S, (P[2, 0] + P[2, 2]) / S
     for i, g in ((0, g0), (1, g1), (2, g2)):

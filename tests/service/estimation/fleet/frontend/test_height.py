@@ -105,14 +105,15 @@ def test_a_climb_is_that_of_the_standard_atmosphere() -> None:
     assert read(heights, 20.0)["height"] == pytest.approx(10.0, abs=0.02)
 
 
-@pytest.mark.parametrize("height", [level, lift, sine, stairs])
-def test_the_height_follows_with_errors_of_the_size_that_it_claims(height: Height) -> None:
+@pytest.mark.parametrize(("height", "most"), [(level, 0.999), (lift, 0.999), (sine, 1.0), (stairs, 0.999)])
+def test_the_height_follows_with_errors_of_the_size_that_it_claims(height: Height, most: float) -> None:
+    """A barometer that is not late is better than it has to be while it climbs, as the sine does all the time."""
     runs = [run(height, seed) for seed in range(20_000, 20_012)]
     errors, stds = (np.concatenate([getattr(one, name) for one in runs]) for name in ("error", "std"))
     assert np.sqrt(np.mean(errors**2)) < 0.4
     sigmas = np.abs(errors / stds)
     assert sigmas.max() < 5.0
-    assert 0.9 < np.mean(sigmas < 1.96) <= 0.999
+    assert 0.9 < np.mean(sigmas < 1.96) <= most
     assert all((one.outcome == ACCEPTED).all() for one in runs)
 
 
@@ -129,10 +130,24 @@ def test_a_door_that_slams_is_doubted_and_widens_the_height() -> None:
 
 
 @pytest.mark.parametrize("climb", [3.0, 5.0, 10.0])
-def test_a_height_that_is_another_at_once_is_believed_after_two_seconds(climb: float) -> None:
+def test_a_pressure_that_jumps_is_height_or_air_and_neither_is_believed(climb: float) -> None:
     found = run(lambda t_s: 1.0 + (climb if t_s >= 30.0 else 0.0), seed=20_001)
     assert np.abs(found.error / found.std).max() < 5.0
-    assert np.abs(found.error[found.t > 32.5]).max() < 1.0
+    after = found.t > 32.5
+    for error in (found.error[after], found.error[after] + climb):  # it has climbed; or the air has changed
+        assert np.abs(error / found.std[after]).max() < 1.5
+
+
+def test_a_barometer_that_is_late_in_a_lift_does_not_lie() -> None:
+    def late(t_s: float) -> float:
+        """Return what a first-order lag of 1.5 s leaves of a lift that has 1.5 m/s from 20 s on, for 10 m."""
+        up = min(max(t_s - 20.0, 0.0), 10.0 / 1.5)
+        after = max(t_s - 20.0 - 10.0 / 1.5, 0.0)
+        return 1.0 + 1.5 * up - 2.25 * (1.0 - math.exp(-up / 1.5)) * math.exp(-after / 1.5)
+
+    found = run(late)
+    error = found.error + np.array([late(t) - lift(t) for t in found.t.tolist()])
+    assert np.abs(error / found.std).max() < 5.0
 
 
 def test_air_that_is_not_that_of_the_standard_atmosphere_is_part_of_the_standard_deviation() -> None:
