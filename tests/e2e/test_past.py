@@ -44,6 +44,26 @@ def is_tracked(track: dict[str, Any], from_ns: int) -> bool:
     return len(states) > 5 and {*states} == {"tracking"}
 
 
+def tracked(track: dict[str, Any], from_ns: int, to_ns: int) -> list[int]:
+    """Return the times between these, without the last second, from which on the tag was tracked for a while."""
+    return [t_ns for t_ns in track["t_ns"] if from_ns < t_ns < to_ns - S and is_tracked(track, t_ns)]
+
+
+def explained_once_tracked(service: Running, began_ns: int) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return a live explanation before which the tag was tracked for a while, and one of two seconds later."""
+    found: list[tuple[dict[str, Any], dict[str, Any]]] = []
+
+    def was_tracked() -> bool:
+        live = service.get(f"{ASKED}/explain?last=10")
+        at_ns = live["pose"]["t_ns"]
+        wait_until(lambda: service.get(f"{ASKED}/pose")["t_ns"] > at_ns + 2 * S)
+        found.append((live, explained(service, at_ns + 2 * S)))
+        return bool(tracked(found[-1][1]["past"]["track"], began_ns, at_ns))
+
+    wait_until(was_tracked, 4 * PATIENCE_S)
+    return found[-1]
+
+
 def test_a_moment_before_a_kill_is_explained_as_it_was_then_and_its_samples_and_a_what_if_are_there(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -56,10 +76,8 @@ def test_a_moment_before_a_kill_is_explained_as_it_was_then_and_its_samples_and_
             wait_until(lambda: is_current(service, TAGS))
             began_ns = time.time_ns()
             wait_until(lambda: service.get(f"{ASKED}/pose")["t_ns"] > began_ns + 8 * S)
-            live = service.get(f"{ASKED}/explain?last=10")
+            live, before = explained_once_tracked(service, began_ns)
             at_ns = live["pose"]["t_ns"]
-            wait_until(lambda: service.get(f"{ASKED}/pose")["t_ns"] > at_ns + 2 * S)
-            before = explained(service, at_ns + 2 * S)
             assert before["pose"]["t_ns"] > at_ns
             service.stop(signal.SIGKILL)
         with running_service(*options) as service:
@@ -70,8 +88,7 @@ def test_a_moment_before_a_kill_is_explained_as_it_was_then_and_its_samples_and_
             place = track["t_ns"].index(at_ns)
             assert [track[name][place] for name in ("x", "y")] == [live["pose"][name] for name in ("x", "y")]
             assert live["pose"]["state"] in (track["state"][place], "coasting")  # the answer came when it was older
-            tracked = [t_ns for t_ns in track["t_ns"] if t_ns > began_ns and is_tracked(track, t_ns)]
-            period = {"from_ns": tracked[0] + S, "to_ns": at_ns}
+            period = {"from_ns": tracked(track, began_ns, at_ns)[0] + S, "to_ns": at_ns}
             what = period | {"settings": {"motion": "carried"}}
             run = run_again(service, "POST", "what-if", json=what)
             assert run["began_at_pose"]
