@@ -44,6 +44,7 @@ class AnchorWatch:
         self._met: defaultdict[int, dict[int, float]] = defaultdict(dict)  # by row and anchor: m, of first ranges
         self._firsts: defaultdict[int, dict[int, float]] = defaultdict(dict)  # by anchor and row
         self._doubted: dict[int, AnchorDoubt] = {}
+        self.any_heard_several = False  # whether any row has ever heard more than one anchor
 
     def begin(self, row: int) -> None:
         """Forget what a row has heard that starts afresh."""
@@ -58,7 +59,9 @@ class AnchorWatch:
         for row, anchor, t_ns, way, lasts, std in steps[:count].tolist():
             if std == 0.0:
                 self._add_step(row, anchor, t_ns, way, alone=lasts and self._hears_one(row, t_ns))
-            elif abs(way) <= max(SURE * std, LEAST_M):
+                continue
+            self.any_heard_several |= not self._hears_one(row, t_ns)
+            if abs(way) <= max(SURE * std, LEAST_M):
                 self._meet(row, anchor, 0.0)
             elif _knows_place(batch.poses, row, t_ns):
                 self._meet(row, anchor, way)

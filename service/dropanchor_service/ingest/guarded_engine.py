@@ -187,7 +187,8 @@ class GuardedEngine:
         for batch in self._bisected(usable, now_ns) if any(map(len, usable.columns())) else ():
             self._starts.look(batch)
             self._anchor_watch.look(batch)
-            widen(batch.poses, *self._anchor_watch.heard(batch.poses), self.anchors.places)
+            if self._anchor_watch.any_heard_several:
+                widen(batch.poses, *self._anchor_watch.heard(batch.poses), self.anchors.places)
             self._sensors.mark(batch.poses)
             self._heights.mark(batch.poses)
             self._norths.look(now_ns)

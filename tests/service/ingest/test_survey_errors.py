@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.columns import POSE, Array, Frame, anchors_at
+from dropanchor_schemas.wire import Frame as Message
+from dropanchor_service.estimation.columns import INNOVATION, POSE, Array, Frame, PoseBatch, SampleBatch, anchors_at
 from dropanchor_service.ingest.survey_errors import SURVEY_STD_M, widen
+from service.ingest.messages import ranges
+from support.ingest import IngestBench, TransparentEngine
 
 FEW_CM = 0.05
 ANCHORS = ((0.0, 0.0), (20.0, 0.0), (0.0, 20.0))
@@ -53,3 +56,26 @@ def test_the_survey_says_nothing_about_a_tag_of_one_anchor_or_in_a_frame_of_its_
 
 def test_a_tag_on_the_line_of_its_anchors_is_wide_and_no_wider_than_the_imu_allows() -> None:
     assert 0.3 < widened(40.0, 0.0, 2)["sigma_pos"][0] < 0.6
+
+
+class Tracking(TransparentEngine):
+    """An engine whose tracks agree with every range."""
+
+    def process(self, samples: SampleBatch) -> PoseBatch:
+        batch = super().process(samples)
+        found = np.zeros(len(batch.poses), INNOVATION)
+        for name in ("row", "t_ns", "anchor"):
+            found[name] = batch.poses[name]
+        found["S"] = 0.01
+        return PoseBatch(poses=batch.poses, innovations=found)
+
+
+@pytest.mark.parametrize(("anchors", "is_wider"), [([7, 7], False), ([7, 8], True)])
+def test_a_pose_is_wider_once_its_tag_hears_a_second_anchor(anchors: list[int], is_wider: bool) -> None:
+    bench = IngestBench(engine=Tracking(), site={"anchors": [{"id": "7"}, {"id": "8", "x": 20.0}]})
+    one, t0_ns = ranges(30.0).ranges[0], bench.clock.now_ns() - 1_000_000_000
+    for k, anchor in enumerate(anchors):
+        bench.send("a", Message(ranges=[one._replace(t_ns=t0_ns + k * 100_000_000, anchor=anchor)]))
+    pose = bench.latest.row(0)
+    assert pose is not None
+    assert (pose["sigma_pos"] > 0.05) == is_wider
