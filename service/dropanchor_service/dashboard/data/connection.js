@@ -57,6 +57,9 @@ export class Connection extends EventTarget {
   #isOutdated = false;
   #refreshTimer = 0;
   #refresh_ms = REFRESH_MS;
+  /** Numbers of requests for the site: the last one, and the last one that was answered. */
+  #asked = 0;
+  #answered = 0;
 
   start() {
     this.#open();
@@ -148,10 +151,15 @@ export class Connection extends EventTarget {
   }
 
   async #requestSite() {
+    const [asked, stream] = [++this.#asked, this.#stream];
     try {
-      if (this.status !== "locked") this.dispatchEvent(new CustomEvent("site", { detail: await getJson(api("site")) }));
+      if (this.status === "locked") return;
+      const site = await getJson(api("site"));
+      if (asked < this.#answered) return; // a later answer has overtaken this one
+      this.#answered = asked;
+      this.dispatchEvent(new CustomEvent("site", { detail: site }));
     } catch (error) {
-      if (this.status === "live") this.#failed(error);
+      if (this.status === "live" && stream === this.#stream) this.#failed(error); // else it was asked with another key
     }
   }
 

@@ -184,7 +184,7 @@ export class AnchorEditor extends EventTarget {
     try {
       const seen = await this.changes.read(pathOf(id));
       this.anchors = [...this.anchors.filter((known) => known.id !== id), seen.value];
-      this.#edit(seen.value, Promise.resolve(seen));
+      if (this.draft === null) this.#edit(seen.value, Promise.resolve(seen)); // else somebody drags another one already
     } catch {
       this.anchors = this.anchors.filter((known) => known.id !== id);
     }
