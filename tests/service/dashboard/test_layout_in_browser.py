@@ -132,7 +132,7 @@ def test_show_all_keeps_every_tag_and_label_clear_of_the_edges_and_the_buttons(c
                 page.page.locator("#zoom-in").click()
                 page.page.locator("#fit").click()
             page.wait_for_map(len(corners))
-            assert len(page.page.evaluate("dropanchor.drawing().labels")) >= 4, size
+            page.wait_for("dropanchor.drawing().labels.length >= 4 && dropanchor.drawing().still")
             assert misplaced(page) == [], size
             for step in range(1, 20, 2):  # also while the tags spread
                 wider = [at * (1 + step / 40) for at in x]

@@ -212,6 +212,8 @@ def test_rules_destinations_tags_and_anchors_are_undone(chromium: Browser, yard:
         said(outcome, "Start of cart set.")
         yard.move("cart", x=9.0, y=9.0)
         watched.wait_for("dropanchor.trail('cart').includes(9)")
+        yard.move("cart", x=5.0, y=5.0)
+        watched.wait_for("dropanchor.trail('cart').includes(5)")
         settings.get_by_label("Colour").press("Control+z")
         said(outcome, "Undone: Start of cart set.")
         watched.wait_for("!dropanchor.trail('cart').includes(9)")

@@ -1,7 +1,7 @@
 /** Switch the page between the present and the past. In the past the fleet is fed from stored tracks instead of the stream. */
 
 import { momentIn, momentValues } from "./address.js";
-import { writeAddress } from "../data/address.js";
+import { isAddressRead, writeAddress } from "../data/address.js";
 import { FiguresPanel } from "../panel/figures_panel.js";
 import { HeatPanel } from "../panel/heat_panel.js";
 import { heightsOfTrack } from "../panel/height_plot.js";
@@ -162,7 +162,7 @@ export class Past {
     fleet.replace(frameAt(tracks, time_ms), performance.now());
     this.#trails.show(tracks, time_ms);
     this.#shownAt = performance.now();
-    if (this.#shownAt - this.#wroteAt > ADDRESS_MS) this.#writeAddress();
+    if (this.#shownAt - this.#wroteAt > ADDRESS_MS && isAddressRead()) this.#writeAddress(); // never over a link that was just followed
     if (membership !== fleet.membership) this.page.updatePanels();
     map.redraw();
   }
