@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, Locator, Page, Route, expect
 
 from dropanchor_schemas.destinations import WebhookDestination
 from dropanchor_schemas.site import Anchor, TagSettings
@@ -15,6 +15,8 @@ from support.browser import WatchedPage, watched_page
 from support.zenoh_router import wait_until
 
 pytestmark = pytest.mark.browser
+
+ZONES = re.compile(r"/api/v1/zones(/ramp)?$")
 
 
 @pytest.fixture
@@ -93,13 +95,18 @@ def test_zones_are_undone_step_by_step_while_they_are_drawn_and_after_they_are_s
         said(outcome, "Undone: Zone Ramp renamed to Gate.")
         expect(name).to_have_value("Ramp")
 
+        held = list[Route]()
+        page.route(ZONES, lambda route: held.append(route) if route.request.method == "GET" else route.continue_())
         form.get_by_role("button", name="Delete…").click()
         form.get_by_role("button", name="Delete zone").click()
         said(outcome, "Zone Ramp deleted.")
         assert "ramp" not in yard.zones
-        page.get_by_label("Filter tags by name").press("Control+z")
+        page.get_by_label("Filter tags by name").press("Control+z")  # before the page has read the zones again
         said(outcome, "Undone: Zone Ramp deleted.")
         assert corner_of(yard, "ramp") == [1.0, 1.0]
+        for read in held:
+            read.continue_()
+        page.unroute(ZONES)
 
         page.get_by_role("button", name="New polygon").click()
         for x, y in ((200, 300), (320, 300), (320, 400)):

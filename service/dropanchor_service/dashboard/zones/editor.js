@@ -169,6 +169,7 @@ export class ZoneEditor extends EventTarget {
 
   /** Show a change that was undone, unless something else is not saved yet. @param {import("../data/undo.js").Step} step */
   async #follow({ path }) {
+    await this.saving.now; // which closes it
     const { zone } = this;
     if (!zone || path !== this.store.items.path(zone.id) || !this.#isUnchanged) return;
     await this.open(zone.id);
