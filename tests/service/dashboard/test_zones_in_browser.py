@@ -73,7 +73,7 @@ def test_who_is_where_names_the_tags_in_each_zone_longest_first_and_can_be_print
         dialog = page.page.get_by_role("dialog", name="Who is where")
         expect(dialog.locator("h3")).to_have_text(["Yard: 2", "Dock: 0", "In no zone: 1"])
         expect(dialog.locator("section").nth(0).locator("li")).to_have_text(
-            [re.compile(r"^early since .*[\d:]{8}$"), re.compile(r"^late since .*[\d:]{8} · Coasting$")]  # with a date at midnight
+            [re.compile(r"^early since .*[\d:]{8}$"), re.compile(r"^late since .*[\d:]{8} · Coasting$")]
         )
         yard.go("late", -10.0, -10.0, t_ns=fresh_ns + 2_000_000_000)
         expect(dialog.locator("h3")).to_have_text(["Yard: 1", "Dock: 0", "In no zone: 2"])
