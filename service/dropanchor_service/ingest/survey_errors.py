@@ -7,17 +7,19 @@ times s far outside of the anchors. They are the same all the time, so no filter
 
 import numpy as np
 
+from dropanchor_schemas.pose import SigmaParts
 from dropanchor_service.estimation.columns import Array, Frame
 
 SURVEY_STD_M = 0.1  # of an anchor along any direction: a measuring tape, or a laser to a corner
-HELD = 0.04  # of Σ u uᵀ, along the direction that the ranges leave open: the IMU holds the track there
-RANGES = 4  # the part of `parts` that errors of anchors belong to
+HELD = 0.04  # added to Σ u uᵀ: where no range tells a direction, the IMU holds the track, so at most 0.5 m are added
+RANGES = list(SigmaParts.model_fields).index("ranges_m")
 
 
 def widen(poses: Array, anchors: Array, heard: Array, places: Array) -> None:
-    """Add what the survey leaves open to the POSE of tags that hear several anchors, in place.
+    """Add what the survey leaves open to the covariance of tags that hear several anchors, and to what tells of it.
 
-    anchors: of each pose, with room for several. heard: which of them it hears. places: ANCHOR.
+    poses: POSE (n,), changed in place. anchors, heard: (n, k), indices of `places`, which are ANCHOR, and whether the
+    tag hears them.
     """
     known = (poses["frame"] == Frame.SITE) & np.isfinite(poses["x"])
     several = np.flatnonzero(known & (heard.sum(axis=1) > 1))

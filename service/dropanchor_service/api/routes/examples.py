@@ -3,6 +3,7 @@
 from typing import Any
 
 _ELLIPSE = {"semi_major_m": 0.24, "semi_minor_m": 0.15, "angle_rad": 1.2}
+_PARTS = {"north_m": 0.06, "mount_m": 0.03, "speed_m": 0.02, "bearing_m": 0.076, "ranges_m": 0.05, "height_m": 0.01}
 
 POSE: dict[str, Any] = {
     "tag": "tag-1",
@@ -27,14 +28,7 @@ POSE: dict[str, Any] = {
     "ellipse_95": _ELLIPSE,
     "p_mode": 0.998,
     "sigma_pos_m": 0.115,
-    "sigma_parts": {
-        "north_m": 0.06,
-        "mount_m": 0.03,
-        "speed_m": 0.02,
-        "bearing_m": 0.076,
-        "ranges_m": 0.05,
-        "height_m": 0.01,
-    },
+    "sigma_parts": _PARTS,
     "sigma_obs_m": 0.31,
     "range_m": 3.64,
     "anchor": "1",
