@@ -68,7 +68,8 @@ def _build_distribution(folder: str, into: Path, time_s: int) -> Path:
             shutil.copyfile(into / LICENCES, staged / LICENCES)
         hatch("sdist", staged, into, time_s)
         with tarfile.open(into / f"{name}.tar.gz") as archive:
-            archive.extractall(unpacked, filter="data")
+            archive.extraction_filter = getattr(tarfile, "data_filter", None)  # Python 3.11.2 has none
+            archive.extractall(unpacked)
         hatch("wheel", unpacked / name, into, time_s)
     return into / f"{name}-py3-none-any.whl"
 

@@ -185,9 +185,10 @@ def _about_missing(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[
     samples = tags.counts(poses["row"][places])["samples"]
     counts = np.column_stack([samples[:, _RANGE], samples[:, _IMU] + samples[:, _HEADING]])
     begins = ~placed & (counts > 0).all(axis=1)
-    yield HINTS[StateReason.RANGES_MISSING], places[begins & motion & ~ranges]
-    yield HINTS[StateReason.IMU_MISSING], places[begins & ranges & ~motion]
-    for i in np.flatnonzero(begins & (ranges == motion)).tolist():
+    ahead_s = (arrivals["motion_ns"] - arrivals["range_ns"]) * 1e-9  # both may end, one a moment before the other
+    yield HINTS[StateReason.RANGES_MISSING], places[begins & (ahead_s >= SENDING_S + lag_s)]
+    yield HINTS[StateReason.IMU_MISSING], places[begins & (-ahead_s >= SENDING_S + lag_s)]
+    for i in np.flatnonzero(begins & (np.abs(ahead_s) < SENDING_S + lag_s)).tolist():
         yield needs_both(*counts[i].tolist()), places[i : i + 1]
 
 

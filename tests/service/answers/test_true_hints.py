@@ -156,9 +156,10 @@ def test_a_tag_that_never_had_a_position_is_not_lost_and_its_hint_says_what_it_n
     watched.bench.site.remove_tag(TAG, T0_NS)  # its start
     first = decode_packed(traffic(1, 1.0, SEED)[0].payload)
     assert isinstance(first, Frame)
-    watched.send(Frame(imu=first.imu[:1], ranges=first.ranges[:1]), T0_NS)
-    for later_s in (0, 2, 15, 3600):
-        watched.clock.t_ns = T0_NS + later_s * S
+    watched.send(Frame(imu=first.imu[:1]), T0_NS)
+    watched.send(Frame(ranges=first.ranges[:1]), T0_NS + S // 10)
+    for later_ds in (1, 20, 21, 22, 150, 36_000):  # also while one of them has ended and the other has not
+        watched.clock.t_ns = T0_NS + later_ds * S // 10
         watched.look()
     assert {state for _, state, _ in watched.told} == {"initialising"}
     hint = "A position needs about 20 s of ranges and of motion samples: 1 and 1 have arrived."

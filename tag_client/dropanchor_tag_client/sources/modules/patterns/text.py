@@ -41,7 +41,7 @@ class TextPattern:
         for group in (before, [*each, *each], after):
             _check_separated(group, pattern)
         self._before, self._repeated, self._after = _names(before), _names(each), _names(after)
-        repeats = f"((?:{_expression(each, capture=False)})++)" if each else ""
+        repeats = f"((?>(?:{_expression(each, capture=False)})+))" if each else ""
         whole = _expression(before, capture=True) + repeats + _expression(after, capture=True)
         self._line = re.compile(_bounded(parts, whole), re.IGNORECASE)
         self._each = re.compile(_expression(each, capture=True), re.IGNORECASE)
