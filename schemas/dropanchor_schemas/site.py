@@ -114,95 +114,132 @@ class StartPose(Exact):
     std_m: Positive = Field(default=0.1, description="Standard deviation of x and of y.")
 
 
+_COLOURS = ["#2f7fd0", "#d97a0a", "#1b8a6b", "#b89b00", "#c7609a", "#cf4a12", "#7a8793"]
+"""Colours that differ for people with any colour vision, and that show on light and on dark."""
+
+
 class TagSettings(Exact):
     """What an operator knows about a tag. A measured range is range_scale · distance + range_bias_m."""
 
     name: Label = Field(default="", description="Display name; empty: the id of the tag.")
     colour: Annotated[str, Field(pattern=r"^#[0-9a-f]{6}$")] | None = Field(
-        default=None, description="Colour that marks the tag on the map, such as #0b62b8; null: none."
+        default=None,
+        description="Colour that marks the tag on the map, such as #0b62b8; null: none.",
+        examples=_COLOURS,
     )
     group: Label = Field(default="", description="Group that lists and streams can select; empty: none.")
     height_m: Number = Field(
-        default=0.0, description="Height of the tag's antenna where it starts, along the anchors' z axis."
+        default=0.0,
+        title="Height",
+        description="Height of the tag's antenna where it starts, along the anchors' z axis.",
     )
     height_told: StrictBool | None = Field(
         default=None,
-        description="Whether `height_m` is the height at which the tag starts; null: unless it is 0, which tags have "
+        title="Height is told",
+        description="Whether the height is that at which the tag starts; null: unless it is 0, which tags have "
         "that nobody told a height. Without it no floor is named.",
     )
     height_motion: Literal["auto", "flat", "free", "reference"] = Field(
         default="auto",
+        title="Changes of the height",
         description="What this height does; auto: it stays, or follows the tag's barometer once it sends pressures; "
         "flat: it stays; free: it changes, and is unknown to 10 m without pressures; reference: it stays, and the "
         "pressures of this tag take the weather out of those of the others.",
     )
     range_std_m: Positive | None = Field(
-        default=None, description="Standard deviation of one range; null: the engine's default."
+        default=None,
+        title="Scatter of ranges",
+        description="Standard deviation of one range; null: the engine's default.",
     )
-    range_bias_m: Number = Field(default=0.0, description="Constant error of the ranges, after the scale.")
+    range_bias_m: Number = Field(
+        default=0.0, title="Bias of ranges", description="Constant error of the ranges, after the scale."
+    )
     range_bias_std_m: NotNegative | None = Field(
         default=None,
+        title="Uncertainty of the bias",
         description="Standard deviation of the bias; 0: exact; null: not calibrated, the engine's default.",
     )
-    range_scale: Positive = Field(default=1.0, description="Measured length per metre of distance.")
+    range_scale: Positive = Field(
+        default=1.0, title="Scale of ranges", description="Measured length per metre of distance."
+    )
     mount_angle_rad: Number | None = Field(
-        default=None, description="Direction of travel minus direction of body x, counter-clockwise; null: unknown."
+        default=None,
+        title="Mounting angle",
+        description="Direction of travel minus direction of body x, counter-clockwise; null: unknown.",
     )
     mount_angle_std_rad: NotNegative | None = Field(
-        default=None, description="Standard deviation of the mounting angle; 0: exact; null: the engine's default."
+        default=None,
+        title="Uncertainty of the mounting angle",
+        description="Standard deviation of the mounting angle; 0: exact; null: the engine's default.",
     )
     lever_forward_m: Number = Field(
         default=0.0,
+        title="Lever ahead",
         description="Distance of the tag in front of the point that follows the course (the rear axle, or the "
         "carrier's feet), along body x.",
     )
     lever_left_m: Number = Field(
-        default=0.0, description="Distance of the tag to the left of that point, along body y."
+        default=0.0,
+        title="Lever to the left",
+        description="Distance of the tag to the left of that point, along body y.",
     )
     slip_std_rad: NotNegative | None = Field(
         default=None,
+        title="Slip",
         description="Standard deviation of the direction of travel about body x plus the mounting angle, caused by "
         "the slip of a vehicle or the sway of a carrier; 0: none; null: the engine's default.",
     )
     speed_max_mps: Positive | None = Field(
-        default=None, description="Top speed of the tag; null: unknown, the engine's default."
+        default=None, title="Top speed", description="Top speed of the tag; null: unknown, the engine's default."
     )
     reverse_allowed: StrictBool = Field(
         default=False,
+        title="Moves backwards",
         description="Whether the tag moves backwards as often as ahead. If false, the engine fleet finds out by itself "
         "when a tag with an accelerometer reverses after a stop.",
     )
     heading_source: Literal["auto", "imu", "platform"] = Field(
         default="auto",
+        title="Source of the heading",
         description="Source of the heading; auto: the IMU if the tag sends IMU samples, otherwise the platform.",
     )
     heading_std_rad: NotNegative | None = Field(
         default=None,
+        title="Error of the heading",
         description="Standard deviation of the constant or slowly varying error of a platform heading that does not "
         "drift; 0: only noise; null: unknown, the heading may drift. With heading_source imu: how far the field where "
         "the tag is turns north, beside the errors that the magnetometer shows; null: unknown.",
     )
     magnetometer_calibrated: StrictBool = Field(
         default=False,
+        title="Magnetometer is calibrated",
         description="Whether the tag's magnetometer is calibrated where it is mounted, to 5 % of the field. Its "
         "heading then counts at once, otherwise after the first turns.",
     )
     motion: Literal["vehicle", "carried", "auto"] = Field(
         default="auto",
+        title="Moved by",
         description="What moves the tag: a vehicle, which follows its course, or a person on foot, who may hold the "
         "tag in any way; auto: a person while the accelerations show steps, otherwise a vehicle.",
     )
     acc_unit: Literal["m/s2", "g", "mg"] = Field(
-        default="m/s2", description="Unit in which the tag sends accelerations; they are converted before their check."
+        default="m/s2",
+        title="Unit of accelerations",
+        description="Unit in which the tag sends accelerations; they are converted before their check.",
     )
     acc_reversed: StrictBool | None = Field(
         default=None,
+        title="Accelerations are reversed",
         description="Whether the accelerations have the opposite sign, as on iOS: down instead of up at rest. If "
         "false, the tag may hang upside down; null: unknown, the check of the sensors looks for it.",
     )
-    gyro_unit: Literal["rad/s", "deg/s"] = Field(default="rad/s", description="Unit in which the tag sends rates.")
+    gyro_unit: Literal["rad/s", "deg/s"] = Field(
+        default="rad/s", title="Unit of rates", description="Unit in which the tag sends rates."
+    )
     range_unit: Literal["m", "cm", "mm", "ft"] = Field(
-        default="m", description="Unit in which the tag sends ranges and their standard deviation."
+        default="m",
+        title="Unit of ranges",
+        description="Unit in which the tag sends ranges and their standard deviation.",
     )
     start: StartPose | None = Field(default=None, description="Where the tag starts, if known.")
 

@@ -6,7 +6,7 @@ from dropanchor_schemas.settings_values import HeldValue, SettingSource, Setting
 from dropanchor_schemas.site import Anchor, Site, TagSettings
 from dropanchor_service.settings.layers import Layer, as_json, fields_of, held_in, setting
 from dropanchor_service.store.site import SiteStore
-from dropanchor_service.store.site_values import Configured, SetValues, SiteDocument
+from dropanchor_service.store.site_values import Configured, SetValues
 
 _TAGS, _DEFAULTS = "tags", "tag_defaults"
 
@@ -17,7 +17,7 @@ def values_of_site(store: SiteStore) -> list[SettingValue]:
     found = [
         *_of_site(document.site, values.site, configured.site, layers),
         *_anchors(values, configured, layers),
-        *_tags(document, values, configured, layers),
+        *_tags(store, values, configured),
         *fields_of(configured.defaults, layers, (_DEFAULTS,)),
     ]
     return sorted(found, key=lambda value: value.source != "rest")
@@ -54,20 +54,22 @@ def _with(held: HeldValue, value: object) -> HeldValue:
     return held.model_copy(update={"value": as_json(value)})
 
 
-def _tags(
-    document: SiteDocument, values: SetValues, configured: Configured, layers: Sequence[Layer]
-) -> Iterator[SettingValue]:
+def _tags(store: SiteStore, values: SetValues, configured: Configured) -> Iterator[SettingValue]:
     for name in values.deleted_ns.keys() & configured.tags.keys():
-        held = [_with(one, configured.tags[name]) for one in held_in(layers, (_TAGS, name))[:1]]
+        held = [_with(one, configured.tags[name]) for one in held_in(store.layers, (_TAGS, name))[:1]]
         yield setting((_TAGS, name), None, held, above="rest")
-    for name, tag in document.tags.items():
-        own = values.tags.get(name, TagSettings()).model_fields_set
-        for value in fields_of(configured.tag(name), layers, (_TAGS, name), (_DEFAULTS,)):
-            field = value.path[-1]
-            if field in own:
-                yield _set_over(value, getattr(tag, field))
-            elif value.at[-3:-1] == [_TAGS, name]:
+    for name in store.tags:
+        for value in values_of_tag(store, name):
+            if value.source == "rest" or value.at[-3:-1] == [_TAGS, name]:
                 yield value
+
+
+def values_of_tag(store: SiteStore, name: str) -> Iterator[SettingValue]:
+    """Yield every value of a tag, also those that it has from the defaults of all tags or as its model has them."""
+    own = store.values.tags.get(name, TagSettings())
+    for value in fields_of(store.configured.tag(name), store.layers, (_TAGS, name), (_DEFAULTS,)):
+        field = value.path[-1]
+        yield _set_over(value, getattr(own, field)) if field in own.model_fields_set else value
 
 
 def _set_over(value: SettingValue, now: object) -> SettingValue:

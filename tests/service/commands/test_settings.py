@@ -130,6 +130,7 @@ def test_rest_lists_the_values_of_a_site_and_what_it_hides_can_be_put_back(tmp_p
     store = open_sites(load_settings(tmp_path / "yard.toml", environment={}))[0].store
     change(store)
     bench = ApiBench(Answers(store, open_sites(load_settings(environment={}))[0].tags, LatestPoses()))
+    bench.answers.tags.register("cart")
     app = bench.app()
 
     def set_values(**query: Any) -> list[dict[str, Any]]:
@@ -143,6 +144,11 @@ def test_rest_lists_the_values_of_a_site_and_what_it_hides_can_be_put_back(tmp_p
         *(("site", "name"), ("site", "anchors", "1"), ("site", "anchors", "2"), ("tags", "a.b")),
         ("tags", "cart", "height_m"),
     }
+    of_cart = {value["path"][2]: value for value in set_values(tag="cart", source=["rest", "file", "default"])}
+    assert of_cart.keys() == TagSettings.model_fields.keys()
+    sources = [of_cart[name]["source"] for name in ("height_m", "range_bias_m", "name")]
+    assert sources == ["rest", "file", "default"]
+    assert ask(app, "GET", "/api/v1/settings?tag=nobody").status_code == 404
     for value in set_values():
         hidden = value["hides"][0]["value"]
         match value["path"]:

@@ -110,21 +110,3 @@ test("latitude and longitude of a place lead back to it", () => {
     assert.ok(Math.hypot(back_x - x, back_y - y) < 1e-4, `${back_x}, ${back_y}`);
   }
 });
-
-test("what is typed into the settings of a tag stays when something else of them is saved", async () => {
-  const { fillForm, patchOf, typedIn } = await import("../../../service/dropanchor_service/dashboard/setup/tag_form.js");
-  globalThis.Option = class {};
-  const fields = Object.fromEntries(["name", "group", "colour", "motion", "mount", "height"].map((name) => [name, { value: "", dataset: { measure: "length" }, replaceChildren() {}, valueAsNumber: NaN }]));
-  const form = { elements: { namedItem: (name) => fields[name] }, querySelector: () => null };
-  const settings = { name: "", group: "", colour: null, motion: "cart", mount_angle_rad: null, height_m: 0 };
-  fillForm(form, settings, new Set());
-  fields.name.value = "Cart 7";
-  const typeAgain = typedIn(form);
-  fillForm(form, { ...settings, group: "carts" }, new Set());
-  typeAgain();
-  assert.deepEqual(patchOf(form), { name: "Cart 7" });
-  assert.equal(fields.group.value, "carts");
-  Object.assign(fields.height, { value: "1.5", valueAsNumber: 1.5 });
-  fillForm(form, { ...settings, name: "Cart 7", height_m: 1.5 }, new Set()); // as saved
-  assert.deepEqual(patchOf(form), {});
-});

@@ -75,7 +75,7 @@ def test_every_text_about_tags_zones_anchors_and_settings_is_from_the_catalogue(
         page.page.locator(f"tr[data-tag='{NAMES[0]}']").click(button="right")
         found |= unmarked(page.page, *data)
         page.page.locator("#menu button").first.click()
-        page.page.locator("#detail summary").click()
+        page.page.locator("#detail .settings > summary").click()
         page.page.locator("[data-part='start']").click()
         found |= unmarked(page.page, *data)
         page.page.locator("[data-part='delete-tag']").click()

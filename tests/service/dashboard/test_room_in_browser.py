@@ -169,7 +169,7 @@ def test_on_a_phone_the_list_comes_first_in_a_sheet_and_one_button_stands_for_th
         page.page.locator("tr[data-tag='cart-3']").click()
         expect(page.page.get_by_role("button", name="The tag is here…")).to_be_visible()
         expect(page.page.locator("#table")).to_be_hidden()
-        page.page.locator("#detail summary").click()
+        page.page.locator("#detail .settings > summary").click()
         assert page.page.get_by_role("button", name="Save settings").evaluate(IS_UNCOVERED)
         assert page.page.evaluate(SMALL_TARGETS) == []
         page.page.locator("#detail [data-part='close']").click()

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from dropanchor_schemas.rejections import Reason
 from dropanchor_schemas.sentences import Sentence, phrase_of, said_by, say, with_stop
+from dropanchor_schemas.site import TagSettings
 from dropanchor_schemas.zones import Circle, Polygon
 from dropanchor_service.answers import hints, reason_hints, unused
 from dropanchor_service.answers.care import care_of, wrong_clock
@@ -233,6 +234,18 @@ def test_every_refusal_of_a_body_is_german_on_a_german_page() -> None:
 def without_quotes(text: str) -> str:
     """Return the text without what the service quotes, such as values and commands."""
     return re.sub(r"'[^']*'|`[^`]*`|\([^)]*\)|https?:\S*", "", text)
+
+
+def test_every_setting_of_a_tag_has_a_german_name_and_says_in_german_what_it_is() -> None:
+    settings = {
+        name: schema for name, schema in TagSettings.model_json_schema()["properties"].items() if name != "start"
+    }
+    of_models = {key.removeprefix("model.") for key in messages("de") if key.startswith("model.")}
+    assert of_models == {f"{name}{end}" for name in settings for end in ("", ".what")}
+    of_values = {key.removeprefix("value.") for key in messages("en") if key.startswith("value.")}
+    for name, schema in settings.items():
+        offered = {*schema.get("enum", []), *schema.get("examples", [])}
+        assert name.endswith("_unit") or offered <= of_values
 
 
 def test_values_inside_a_refusal_are_said_in_german_too() -> None:

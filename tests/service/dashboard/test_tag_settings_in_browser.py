@@ -1,4 +1,4 @@
-"""The settings of a tag on the page: name, colour, group, motion, angle, height, start; and its deletion."""
+"""The settings of a tag on the page, its start, and its deletion."""
 
 import math
 import re
@@ -24,10 +24,14 @@ def open_settings(page: WatchedPage, tag: str) -> Locator:
     """Open the settings of a tag, and return their form once it is filled."""
     page.page.locator(f"tr[data-tag='{tag}']").click()
     with page.page.expect_response(lambda response: f"/{tag}/settings" in response.url):
-        page.page.locator("#detail summary").click()
+        page.page.locator("#detail .settings > summary").click()
     form = page.page.get_by_role("form", name="Settings of the tag")
-    expect(form.get_by_label("Height")).to_have_attribute("data-shown", re.compile(r"^.*$"))
+    expect(setting(form, "height_m")).to_have_attribute("data-shown", re.compile(r"^.*$"))
     return form
+
+
+def setting(form: Locator, name: str) -> Locator:
+    return form.locator(f"[name={name}]")
 
 
 def test_a_name_a_colour_and_a_group_show_on_the_list_and_the_map_of_every_page(
@@ -65,9 +69,11 @@ def test_settings_are_saved_undone_and_merged_with_those_of_another_page(chromiu
     store = place.bench.answers.site
     with watched_page(chromium, place.url) as page:
         form = open_settings(page, "cart")
-        form.get_by_label("Moved by").select_option("carried")
-        form.get_by_label("Mounting angle").fill("90")
-        form.get_by_label("Height").fill("1.2")
+        expect(setting(form, "group")).to_have_attribute("list", "groups")
+        check_all_settings(form)
+        form.get_by_label("Moved by").select_option("A person on foot")
+        setting(form, "mount_angle_rad").fill("90")
+        setting(form, "height_m").fill("1.2")
         form.get_by_role("button", name="Save settings").click()
         outcome = page.page.locator("#outcome")
         expect(outcome).to_contain_text("Settings of cart changed.")
@@ -76,20 +82,49 @@ def test_settings_are_saved_undone_and_merged_with_those_of_another_page(chromiu
         outcome.get_by_role("button", name="Undo").click()
         expect(outcome).to_contain_text("Undone")
         assert store.tag_settings("cart") == TagSettings()
-        expect(form.get_by_label("Height")).to_have_value("")
+        expect(setting(form, "height_m")).to_have_value("0")
 
-        for typed, told in (("0", TagSettings(height_told=True)), ("", TagSettings())):
-            form.get_by_label("Height").fill(typed)
-            with page.page.expect_response(is_read):
-                form.get_by_role("button", name="Save settings").click()
-            assert store.tag_settings("cart") == told
-            expect(form.get_by_label("Height")).to_have_value(typed)
+        form.get_by_text("All other settings").click()
+        form.get_by_label("Height is told").select_option("Yes")
+        setting(form, "range_std_m").fill("0.2")
+        form.get_by_label("Moves backwards").select_option("Yes")
+        setting(form, "mount_angle_std_rad").fill("2")
+        with page.page.expect_response(is_read):
+            form.get_by_role("button", name="Save settings").click()
+        told = TagSettings(height_told=True, range_std_m=0.2, reverse_allowed=True, mount_angle_std_rad=math.radians(2))
+        assert store.tag_settings("cart") == told
+        expect(form.locator("#setting-range_std_m")).to_contain_text("Default: not set. In force: set here.")
+        setting(form, "range_std_m").fill("")
+        with page.page.expect_response(is_read):
+            form.get_by_role("button", name="Save settings").click()
+        assert store.tag_settings("cart") == told.model_copy(update={"range_std_m": None})
 
+        setting(form, "range_scale").fill("0")
+        form.get_by_role("button", name="Save settings").click()
+        expect(form.locator("#setting-range_scale").get_by_role("alert")).to_have_text(re.compile("greater than 0"))
+        expect(setting(form, "range_scale")).to_have_value("0")
+        setting(form, "range_scale").fill("1")
+        expect(form.get_by_role("alert")).to_have_count(0)
+        store.set_tag("cart", TagSettings())
+        page.page.reload()
+        form = open_settings(page, "cart")
         form.get_by_label("Name").fill("Mine")
         store.set_tag("cart", TagSettings(name="Theirs", height_m=2.0))
         form.get_by_role("button", name="Save settings").click()
         outcome.get_by_role("button", name="Keep mine").click()
         wait_until(lambda: store.tag_settings("cart") == TagSettings(name="Mine", height_m=2.0))
+
+
+def check_all_settings(form: Locator) -> None:
+    """The form has every setting but the start, and says what each is, its unit, its default and where it is from."""
+    names = form.evaluate("form => [...form.elements].map(({ name }) => name).filter((name) => name)")
+    assert sorted([*names, "start"]) == sorted(TagSettings.model_fields)
+    for name in names:
+        box = form.locator(f"#setting-{name}")
+        expect(box).to_contain_text(re.compile(r"\. ?Default: .+\. In force: default\."))
+    expect(form.locator("#setting-mount_angle_rad")).to_contain_text("Mounting angle ° Direction of travel minus")
+    expect(form.locator("#setting-lever_left_m")).to_contain_text("Default: 0 m.")
+    expect(form.locator("#setting-speed_max_mps")).to_contain_text("Top speed m/s Top speed of the tag; not set")
 
 
 def is_read(answer: Response) -> bool:
@@ -130,11 +165,11 @@ def test_what_is_typed_while_a_change_is_saved_stays_and_is_saved_after_it(
         form = open_settings(page, "cart")
         save = form.get_by_role("button", name="Save settings")
         page.page.route("**/settings", lambda route: held.append(route), times=1)
-        form.get_by_label("Height").fill("0")
+        setting(form, "height_m").fill("0")
         with page.page.expect_request("**/settings"):
             save.click()
         form.get_by_label("Name").fill("Forklift 1")
-        form.get_by_label("Height").fill(height)
+        setting(form, "height_m").fill(height)
         save.click()
         held[0].continue_()
         expect(form.get_by_label("Name")).to_have_attribute("data-shown", "Forklift 1")
@@ -207,7 +242,7 @@ def test_a_key_sees_only_the_buttons_that_it_may_use(
         with page.page.expect_response(lambda response: response.url.endswith("/access")):
             page.page.get_by_role("button", name="Open").click()
         page.page.locator("tr[data-tag='cart']").click()
-        summary = page.page.locator("#detail summary")
+        summary = page.page.locator("#detail .settings > summary")
         if edits:
             summary.click()
         expect(summary).to_be_visible(visible=edits)

@@ -109,6 +109,11 @@ def test_a_deleted_tag_of_the_settings_file_is_given_back(chromium: Browser, yar
         dialog = opened(page)
         dialog.get_by_role("button", name="Give back tags › cart").click()
         expect(dialog.get_by_role("button", name="Give back")).to_have_count(0)
+        page.page.keyboard.press("Escape")
+        page.page.locator("tr[data-tag='cart']").click()
+        page.page.locator("#detail .settings > summary").click()
+        expect(page.page.locator("#setting-height_m")).to_contain_text("Default: 0 m. In force: yard.toml.")
+        expect(page.page.locator("#setting-name")).to_contain_text("In force: default.")
     assert yard.store.tags == yard.store.configured.tags
 
 

@@ -202,9 +202,9 @@ def test_rules_destinations_tags_and_anchors_are_undone(chromium: Browser, yard:
         assert destinations.all["shift"].enabled
 
         page.locator("tr[data-tag='cart']").click()
-        page.locator("#detail summary").click()
+        page.locator("#detail .settings > summary").click()
         settings = page.get_by_role("form", name="Settings of the tag")
-        expect(settings.get_by_label("Height")).to_have_attribute("data-shown", "")
+        expect(settings.locator("[name=height_m]")).to_have_attribute("data-shown", "0")
         settings.get_by_label("Name").fill("Forklift 1")
         settings.get_by_label("Group").fill("forklifts")
         settings.get_by_label("Group").press("Enter")

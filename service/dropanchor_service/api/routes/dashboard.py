@@ -6,6 +6,7 @@ from hashlib import sha256
 from importlib.resources import files
 from mimetypes import guess_type
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 from pydantic import TypeAdapter
@@ -16,6 +17,7 @@ from starlette.routing import BaseRoute, Match, Mount, Route
 from starlette.staticfiles import NotModifiedResponse, PathLike, StaticFiles
 from starlette.types import ASGIApp, Scope
 
+from dropanchor_schemas.site import TagSettings
 from dropanchor_schemas.zones import EventRule
 from dropanchor_service.api.help.routes import help_routes
 from dropanchor_service.api.http.site_in_path import is_omlox
@@ -88,13 +90,18 @@ ELSEWHERE = {"/openapi.json": "api/v1/openapi.json", "/api/v1/docs": "../../docs
 
 
 def page_mounts(dashboard: Path) -> list[BaseRoute]:
-    """Return the routes of the pages: documentation, that of REST, the schema of rules, last the dashboard."""
+    """Return the routes of the pages: documentation, that of REST, schemas, last the dashboard."""
     swagger_ui = _Files(Path(str(files("fastapi_swagger.resources"))))
     leading = [_leading(path, to) for path, to in ELSEWHERE.items()]
     of_rest = Mount("/docs/swagger-ui", app=_compressed(swagger_ui), name="swagger-ui")
-    rules = JSONResponse(TypeAdapter(EventRule).json_schema(), headers={"cache-control": "no-cache"})
-    of_rules = Route("/schemas/event_rule.json", rules, methods=["GET"], include_in_schema=False)
-    return [*leading, *help_routes(), of_rest, of_rules, DashboardMount(dashboard)]
+    models = [_model("event_rule", TypeAdapter(EventRule)), _model("tag_settings", TypeAdapter(TagSettings))]
+    return [*leading, *help_routes(), of_rest, *models, DashboardMount(dashboard)]
+
+
+def _model(name: str, model: TypeAdapter[Any]) -> Route:
+    """Return the route of the schema of a model, of which the page makes a form."""
+    answer = JSONResponse(model.json_schema(), headers={"cache-control": "no-cache"})
+    return Route(f"/schemas/{name}.json", answer, methods=["GET"], include_in_schema=False)
 
 
 def _leading(path: str, to: str) -> Route:

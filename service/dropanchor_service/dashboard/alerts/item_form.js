@@ -1,9 +1,9 @@
 /** The form of a destination or a rule. Fields with `data-for` belong to some types only. */
 
-import { readMeasure, writeMeasure } from "../data/units.js";
+import { fill, valueOf } from "../page/model_fields.js";
 import { partOf } from "../page/parts.js";
 
-/** @typedef {import("../data/items.js").Item} Item @typedef {HTMLInputElement | HTMLSelectElement | HTMLTextAreaElement} Field */
+/** @typedef {import("../data/items.js").Item} Item @typedef {import("../page/model_fields.js").Field} Field */
 
 export class ItemForm {
   /** What is shown, so that what is being typed is not overwritten. @type {Item | null} */
@@ -45,7 +45,7 @@ export class ItemForm {
     }
     for (const field of this.#fields()) {
       field.disabled = field.closest("[hidden]:not(form)") !== null;
-      if (!field.disabled) fill(field, item);
+      if (!field.disabled) fill(field, item[field.name]);
     }
     this.#fields().find((field) => !field.disabled)?.focus();
   }
@@ -76,22 +76,4 @@ export class ItemForm {
     part.textContent = text;
     part.hidden = text === "";
   }
-}
-
-/** @param {Field} field @param {Item} item */
-function fill(field, item) {
-  const value = item[field.name];
-  if (field.dataset.as === "choice") /** @type {HTMLInputElement} */ (field).checked = value.includes(field.value);
-  else if (field.type === "checkbox") /** @type {HTMLInputElement} */ (field).checked = value;
-  else if (field.dataset.measure) writeMeasure(/** @type {HTMLInputElement} */ (field), value);
-  else field.value = Array.isArray(value) ? value.join(", ") : String(value ?? "");
-}
-
-/** @param {Field} field */
-function valueOf(field) {
-  if (field.type === "checkbox") return /** @type {HTMLInputElement} */ (field).checked;
-  if (field.dataset.measure) return readMeasure(/** @type {HTMLInputElement} */ (field));
-  if (field.type === "number") return /** @type {HTMLInputElement} */ (field).valueAsNumber;
-  if (field.dataset.as === "list") return field.value.split(/[\s,]+/).filter((part) => part !== "");
-  return field.dataset.as === "secret" && field.value === "" ? null : field.value;
 }

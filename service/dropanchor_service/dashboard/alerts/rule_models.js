@@ -1,12 +1,10 @@
 /** The rules that the service knows, from the schema that validates them. */
 
 import { getJson } from "../data/connection.js";
-import { installUnits } from "../data/units.js";
-import { decimal, t } from "../i18n/language.js";
+import { t } from "../i18n/language.js";
+import { labelled } from "../page/model_fields.js";
 import { ownValues } from "./words.js";
-import { element } from "./lines.js";
 
-/** @typedef {{minimum: number, maximum: number, default?: number, examples?: number[]}} Schema of a number */
 /** @typedef {{properties: Record<string, any>}} Model */
 
 /** Return what each type of rule begins with, and the fields of the values that only some types have.
@@ -18,19 +16,8 @@ export async function ruleModels() {
     const own = ownValues(properties);
     const values = own.map((name) => [name, properties[name].default ?? properties[name].examples[0]]);
     const begin = { name: "", tags: [], groups: [], severity: "alarm", type, ...Object.fromEntries(values) };
-    return { type, begin, fields: own.map((name) => fieldOf(type, name, properties[name])) };
+    const fields = own.map((name) => labelled(name, { ...properties[name], default: undefined }, t(`rule.field.${name}`)));
+    for (const { dataset } of fields) dataset.for = type;
+    return { type, begin, fields };
   });
-}
-
-/** @param {string} type @param {string} name which ends with the unit @param {Schema} schema */
-function fieldOf(type, name, { minimum, maximum }) {
-  const label = element("label", t(`rule.field.${name}`));
-  const unit = element("small", name.endsWith("_s") ? "s" : t("rule.range", { least: decimal(minimum, 0, 3), most: decimal(maximum, 0, 3) }));
-  const input = Object.assign(document.createElement("input"), { name, type: "number", step: "any", min: minimum, max: maximum, required: true });
-  const measure = name.endsWith("_mps") ? "velocity" : name.endsWith("_m") ? "length" : "";
-  if (measure) unit.dataset.unit = input.dataset.measure = measure;
-  label.dataset.for = type;
-  label.append(" ", unit, " ", input);
-  installUnits(label);
-  return label;
 }

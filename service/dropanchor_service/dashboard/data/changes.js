@@ -12,7 +12,7 @@ import { refusal } from "../i18n/said.js";
 
 const RETRY_MS = 3000;
 
-/** Events: "done" (detail: the path of what was changed), "failed" (detail: a sentence), "conflict" (detail: Conflict), "access". */
+/** Events: "done" (detail: the path of what was changed), "failed" (detail: the error), "conflict" (detail: Conflict), "access". */
 export class Changes extends EventTarget {
   history = new UndoStack();
   /** The deletions that wait until nobody can undo them any longer: what sends each, by its path. @type {Map<string, () => void>} */
@@ -113,7 +113,7 @@ export class Changes extends EventTarget {
         await this.#swap(path, null, null, etag);
       } catch (error) {
         if (error instanceof UnreachableError) return void (timer = setTimeout(send, RETRY_MS));
-        this.#tell("failed", sentence(error));
+        this.#tell("failed", error);
       }
       return void this.#leaving.delete(path);
     };
@@ -156,7 +156,7 @@ export class Changes extends EventTarget {
       return true;
     } catch (error) {
       if (error instanceof ChangedMeanwhileError && conflict) this.#tell("conflict", { what, ...conflict });
-      else this.#tell("failed", sentence(error));
+      else this.#tell("failed", error);
       return false;
     }
   }

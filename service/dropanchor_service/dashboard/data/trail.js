@@ -2,6 +2,7 @@
 
 import { sendChange } from "./access.js";
 import { api, getJson } from "./connection.js";
+import { t } from "../i18n/language.js";
 
 /** @typedef {{source: string, file: string | null, at: string[], value: any}} Held */
 /** @typedef {Held & {path: string[], hides: Held[]}} Setting */
@@ -75,4 +76,11 @@ export function differences(before, after) {
   const keys = Object.keys({ ...before, ...after });
   return keys.map((key) => /** @type {[string, any, any]} */ ([key, before[key], after[key]]))
     .filter(([, one, other]) => JSON.stringify(one) !== JSON.stringify(other));
+}
+
+/** Return where a value is from, for people. @param {Held} held @param {string[]} path of the setting, which the settings file may hold elsewhere, as for all tags */
+export function sourceOf({ source, file, at }, path) {
+  if (file === null) return t(`trail.from_${source}`);
+  const isThere = path.join() === at.join() || path[1] === "anchors";
+  return file.replace(/^.*[\\/]/, "") + (isThere ? "" : `: ${at.join(" › ")}`);
 }

@@ -22,12 +22,12 @@ export const unitNames = {
 };
 
 /** The units that the page uses. */
-export const units = { length: UNITS.length[unitNames.length], velocity: UNITS.velocity[unitNames.velocity] };
+export const units = { length: UNITS.length[unitNames.length], velocity: UNITS.velocity[unitNames.velocity], angle: { symbol: "°", factor: 180 / Math.PI } };
 
 /** Whether the page uses SI units, as files and interfaces do. */
 export const isSi = units.length.factor === 1 && units.velocity.factor === 1;
 
-/** @typedef {keyof typeof UNITS} Kind */
+/** @typedef {keyof typeof units} Kind */
 
 /** @param {HTMLInputElement} input @returns {Unit} */
 const unitOf = (input) => units[/** @type {Kind} */ (input.dataset.measure)];
@@ -60,6 +60,9 @@ export function readMeasure(input) {
   if (input.value === input.dataset.shown) return Number(input.dataset.exact);
   return input.valueAsNumber / unitOf(input).factor;
 }
+
+/** Return a measure with its unit, as a person would type it. @param {number} value in SI units @param {Kind} kind */
+export const measureText = (value, kind) => `${typed(value, units[kind])} ${units[kind].symbol}`;
 
 /** Return a value as a person would type it. @param {number} value in SI units @param {Unit} unit */
 const typed = (value, { factor }) => String(factor === 1 ? value : Number((value * factor).toFixed(3)));

@@ -19,7 +19,7 @@ export function installLanguages(list) {
   list.addEventListener("change", () => choose("lang", list.value));
 }
 
-/** Offer the units of a kind in a list. @param {HTMLSelectElement} list @param {import("../data/units.js").Kind} kind */
+/** Offer the units of a kind in a list. @param {HTMLSelectElement} list @param {keyof typeof UNITS} kind */
 export function installUnitChoice(list, kind) {
   list.replaceChildren(...Object.entries(UNITS[kind]).map(([name, { symbol }]) => new Option(symbol, name, false, name === unitNames[kind])));
   list.addEventListener("change", () => choose(kind, list.value));

@@ -9,6 +9,9 @@ export const partOf = (box, name) => /** @type {HTMLElement} */ (box.querySelect
 /** @param {HTMLFormElement} form @param {string} name */
 export const fieldOf = (form, name) => /** @type {HTMLInputElement} */ (form.elements.namedItem(name));
 
+/** Return the number in a field; null when it is empty. @param {HTMLInputElement} input */
+export const numberOf = (input) => (Number.isNaN(input.valueAsNumber) ? null : input.valueAsNumber);
+
 /** @param {Element} element @param {string} text */
 export function write(element, text) {
   if (element.textContent !== text) element.textContent = text;

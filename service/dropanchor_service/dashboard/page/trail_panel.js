@@ -1,6 +1,6 @@
 /** The dialog of settings and changes: where values come from, who changed what, and how to take either back. */
 
-import { bringBack, differences, giveBackOf, NewerError, readEntries, readSettings, trailUrl, undoOf } from "../data/trail.js";
+import { bringBack, differences, giveBackOf, NewerError, readEntries, readSettings, sourceOf, trailUrl, undoOf } from "../data/trail.js";
 import { saveFile } from "../data/save_file.js";
 import { t, timeText } from "../i18n/language.js";
 import { refusal } from "../i18n/said.js";
@@ -106,13 +106,6 @@ function changesOf({ before, after }) {
   const found = differences(before, after);
   const parts = found.slice(0, SHOWN).map(([key, one, other]) => `${key}: ${written(one)} → ${written(other)}`);
   return parts.join("; ") + (found.length > SHOWN ? "; …" : "");
-}
-
-/** @param {Held} held @param {string[]} path of the setting, which the settings file may hold elsewhere, as for all tags */
-function sourceOf({ source, file, at }, path) {
-  if (file === null) return t(`trail.from_${source}`);
-  const isThere = path.join() === at.join() || path[1] === "anchors";
-  return file.replace(/^.*[\\/]/, "") + (isThere ? "" : `: ${at.join(" › ")}`);
 }
 
 /** @param {object} value */

@@ -13,7 +13,6 @@ import { fieldOf, partOf, write } from "../page/parts.js";
 
 const MINUTE_MS = 60_000;
 const MOST_MS = 30 * MINUTE_MS; // that the service runs again
-const RADIANS = Math.PI / 180;
 
 /** @typedef {{id: string, x: number, y: number}} Anchor */
 /** @typedef {{settings?: Record<string, any>, anchors?: Anchor[]}} Other what differs */
@@ -68,11 +67,10 @@ export class WhatIf {
   /** @returns {Other} */
   #typed() {
     const [motion, anchor] = ["motion", "anchor"].map((name) => fieldOf(this.form, name).value);
-    const degrees = fieldOf(this.form, "mount").valueAsNumber;
-    const [x, y] = ["x", "y"].map((name) => readMeasure(fieldOf(this.form, name)) ?? 0);
+    const [mount_angle_rad, x, y] = ["mount", "x", "y"].map((name) => readMeasure(fieldOf(this.form, name)));
     return {
-      settings: { ...(motion && { motion }), ...(Number.isNaN(degrees) ? {} : { mount_angle_rad: degrees * RADIANS }) },
-      anchors: this.map.anchors.filter(({ id }) => id === anchor).map((known) => ({ ...known, x, y })),
+      settings: { ...(motion && { motion }), ...(mount_angle_rad === null ? {} : { mount_angle_rad }) },
+      anchors: this.map.anchors.filter(({ id }) => id === anchor).map((known) => ({ ...known, x: x ?? 0, y: y ?? 0 })),
     };
   }
 

@@ -1,13 +1,12 @@
 /** The panel of the floor plans: a list, the upload of a file, and a form for the plan that is being edited. */
 
 import { confirmed } from "../setup/confirm.js";
-import { numberOf } from "../setup/tag_form.js";
 import { PlanPoints } from "./plan_points.js";
 import { isWorldFile, worldOf } from "./world_file.js";
 import { readMeasure, writeMeasure } from "../data/units.js";
 import { t } from "../i18n/language.js";
 import { begun, refusal } from "../i18n/said.js";
-import { fieldOf, partOf, writeOrHide } from "../page/parts.js";
+import { fieldOf, numberOf, partOf, writeOrHide } from "../page/parts.js";
 
 const DEGREES = 180 / Math.PI;
 

@@ -23,7 +23,7 @@ export class Outcome {
     this.history.addEventListener("undone", (event) => this.#undone(detailOf(event)));
     this.history.addEventListener("failed", (event) => this.#show(whyNot(detailOf(event)), []));
     this.history.addEventListener("forgot", () => this.#step && !this.history.has(this.#step) && this.#clear());
-    changes.addEventListener("failed", (event) => this.#show(detailOf(event), []));
+    changes.addEventListener("failed", (event) => this.#show(sentence(detailOf(event)), []));
     changes.addEventListener("conflict", (event) => this.#conflict(detailOf(event)));
     box.addEventListener("focusin", ({ relatedTarget }) => {
       if (relatedTarget instanceof HTMLElement && !box.contains(relatedTarget)) this.#from = relatedTarget;

@@ -1,11 +1,11 @@
-/** The settings of the selected tag: name, colour, group, motion, mounting angle, height, start; and its deletion. */
+/** The settings of the selected tag, its start, and its deletion. */
 
 import { readMeasure, writeMeasure } from "../data/units.js";
 import { Saving } from "../data/saving.js";
 import { confirmed } from "./confirm.js";
-import { fillForm, noteSent, numberOf, patchOf, typedIn } from "./tag_form.js";
+import { fillForm, makeFields, noteSent, patchOf, showRefused, showSources, typedIn } from "./tag_form.js";
 import { t } from "../i18n/language.js";
-import { fieldOf, partOf } from "../page/parts.js";
+import { fieldOf, numberOf, partOf } from "../page/parts.js";
 
 /** @typedef {import("../data/changes.js").Seen} Seen */
 
@@ -16,6 +16,8 @@ export class TagPanel {
   #seen = null;
   /** The tag whose settings the form was filled with. */
   #filled = "";
+  /** Ends when the form has its fields. @type {Promise<void> | null} */
+  #made = null;
   /** The latest request for the settings. */
   #loading = Promise.resolve();
   #saving = new Saving();
@@ -46,6 +48,7 @@ export class TagPanel {
     this.startForm.addEventListener("submit", (event) => this.#saveStart(event));
     this.startForm.addEventListener("reset", () => start.cancel());
     start.addEventListener("change", () => this.#showStart());
+    changes.addEventListener("failed", (event) => this.#saving.now && showRefused(this.form, /** @type {CustomEvent} */ (event).detail));
     changes.addEventListener("access", () => this.update());
     changes.addEventListener("done", (event) => /** @type {CustomEvent} */ (event).detail === this.#path && this.#load());
     choice.addEventListener("change", () => this.update());
@@ -81,16 +84,32 @@ export class TagPanel {
     if (tag !== this.#filled || !this.box.open) this.#seen = null;
     if (!tag || !this.box.open) return;
     try {
+      await this.#fields();
       const seen = await this.changes.read(this.#path);
       if (tag !== this.#tag) return;
       const typeAgain = keep && tag === this.#filled ? typedIn(this.form) : () => false;
-      fillForm(this.form, seen.value, new Set(this.fleet.groups.filter((group) => group !== "")));
+      fillForm(this.form, seen.value);
       const isOvertaken = typeAgain(); // then what was read before stays, so that saving asks
       this.#seen = isOvertaken && this.#seen ? this.#seen : seen;
       this.#filled = tag;
+      this.#offerGroups();
+      await showSources(this.form, tag);
     } catch {
       // A tag that was deleted has no settings. The table drops it with its next update.
     }
+  }
+
+  #fields() {
+    return (this.#made ??= makeFields(this.form).catch((error) => {
+      this.#made = null;
+      throw error;
+    }));
+  }
+
+  #offerGroups() {
+    fieldOf(this.form, "group").setAttribute("list", "groups");
+    const groups = new Set(this.fleet.groups.filter((group) => group !== ""));
+    partOf(this.form, "groups").replaceChildren(...[...groups].sort().map((group) => new Option(group)));
   }
 
   /** Save what is typed, once an earlier change is saved and shown. @param {Event} event */
@@ -143,8 +162,9 @@ export class TagPanel {
   }
 
   /** Open the settings of the selected tag. */
-  openSettings() {
+  async openSettings() {
     this.box.open = true;
+    await this.#fields();
     const name = /** @type {HTMLElement} */ (this.form.elements.namedItem("name"));
     name.scrollIntoView({ block: "nearest" });
     name.focus();

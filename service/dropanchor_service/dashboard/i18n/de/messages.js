@@ -5,6 +5,7 @@ import alerts from "./alerts.js";
 import events from "./events.js";
 import find from "./find.js";
 import plans from "./plans.js";
+import models from "./models.js";
 import keys from "./keys.js";
 import notify from "./notify.js";
 import page from "./page.js";
@@ -17,4 +18,4 @@ import service from "./service.js";
 import share from "./share.js";
 import trail from "./trail.js";
 
-export default { ...alarms, ...alerts, ...events, ...find, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...refusals, ...share, ...trail };
+export default { ...alarms, ...alerts, ...events, ...find, ...plans, ...keys, ...models, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...refusals, ...share, ...trail };
