@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-const { Choice, MOST_SELECTED } = await import("../../../service/dropanchor_service/dashboard/page/choice.js");
+const { Choice, COLOURS, MOST_SELECTED } = await import("../../../service/dropanchor_service/dashboard/page/choice.js");
 const { STATES, stateNumber } = await import("../../../service/dropanchor_service/dashboard/data/states.js");
 const { listIn, listText } = await import("../../../service/dropanchor_service/dashboard/data/address.js");
 const { joinedCsv, joinedGeojson } = await import("../../../service/dropanchor_service/dashboard/data/joined_tracks.js");
@@ -18,6 +18,42 @@ test("one selected tag is no group of tags, however it was selected", () => {
   assert.deepEqual([choice.selected, choice.several], ["b", []]);
   toggle(choice, "b");
   assert.deepEqual([choice.selected, choice.tags], [null, []]);
+});
+
+test("a selected tag keeps its colour while it is selected, and no other one has it while there are enough", () => {
+  const choice = new Choice();
+  choice.selectAll(["a", "b", "c"]);
+  const [, b, c] = ["a", "b", "c"].map((tag) => choice.colourOf(tag));
+  choice.selectAll(["b", "d", "c", "e"]);
+  assert.deepEqual([choice.colourOf("b"), choice.colourOf("c"), choice.colourOf("a")], [b, c, ""]);
+  assert.equal(new Set(["b", "c", "d", "e"].map((tag) => choice.colourOf(tag))).size, 4);
+});
+
+/** What people without cones of one kind see of linear red, green and blue (Machado, Oliveira and Fernandes, 2009). */
+const SEEN = [
+  [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+  [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]],
+  [[0.367, 0.861, -0.228], [0.28, 0.673, 0.047], [-0.012, 0.043, 0.969]],
+  [[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]],
+];
+const XYZ = [[0.4339, 0.3762, 0.1899], [0.2126, 0.7152, 0.0722], [0.0177, 0.1095, 0.8729]]; // relative to white
+const times = (matrix, vector) => matrix.map((row) => row.reduce((sum, one, i) => sum + one * vector[i], 0));
+
+/** Return a colour in CIE Lab, as seen. @param {string} colour @param {number[][]} seen */
+function lab(colour, seen) {
+  const linear = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16) / 255).map((part) => ((part + 0.055) / 1.055) ** 2.4);
+  const [x, y, z] = times(XYZ, times(seen, linear).map((part) => Math.min(1, Math.max(0, part)))).map((part) => (part > 0.0089 ? Math.cbrt(part) : 7.787 * part + 0.138));
+  return [116 * y - 16, 500 * (x - y), 200 * (y - z)];
+}
+
+test("the colours of selected tags differ for people with any colour vision", () => {
+  const pairs = COLOURS.flatMap((one, i) => COLOURS.slice(i + 1).map((other) => [one, other]));
+  for (const [one, other] of pairs) {
+    for (const seen of SEEN) {
+      const [a, b] = [one, other].map((colour) => lab(colour, seen));
+      assert.ok(Math.hypot(...a.map((part, i) => part - b[i])) > 20, `${one} ${other}`);
+    }
+  }
 });
 
 test("while tags are gathered even one is a group, until the last is taken out", () => {

@@ -7,6 +7,7 @@ globalThis.location = /** @type {any} */ ({ search: "", hash: "" });
 const { drawMarkers, drawSelection } = await import(`${PAGE}map/draw_tags.js`);
 const { drawEllipses, drawGhosts } = await import(`${PAGE}map/draw_doubt.js`);
 const { haloText } = await import(`${PAGE}map/draw_site.js`);
+const { COLOURS } = await import(`${PAGE}page/choice.js`);
 const { FADE } = await import(`${PAGE}map/scene.js`);
 const { STATES } = await import(`${PAGE}data/states.js`);
 const { Fleet } = await import(`${PAGE}data/fleet.js`);
@@ -79,7 +80,8 @@ function sceneOf(age_s, /** @type {Record<string, string>} */ colours) {
   const view = Object.assign(new View(), { x: 0, y: 0, scale: 10, width: 400, height: 400 });
   const rows = Int32Array.from(states, (_, i) => i);
   const ctx = new NotedCanvas();
-  return /** @type {any} */ ({ ctx, view, palette: paletteOf(colours), fleet, rows, selected: 0, chosen: [0], hovered: 1, now_ms: 0 });
+  const colourOf = (/** @type {number} */ row) => COLOURS[row];
+  return /** @type {any} */ ({ ctx, view, palette: paletteOf(colours), fleet, rows, selected: 0, chosen: [0, 1, 2, 3, 4], colourOf, hovered: 1, now_ms: 0 });
 }
 
 for (const [theme, colours] of Object.entries({ light, dark })) {

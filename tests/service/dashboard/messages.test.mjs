@@ -10,7 +10,7 @@ import en from "../../../service/dropanchor_service/dashboard/i18n/en/messages.j
 
 const PAGE = join(dirname(fileURLToPath(import.meta.url)), "../../../service/dropanchor_service/dashboard");
 /** Keys that the page makes of names: of states, units and events, and of words and sentences of the service. */
-const MADE = /^(lane|state|status|phone|alerts\.new_|handle|kind|map\.outside|value|destination|event|mail|part|plans\.how|columns|rule|severity|word|say|trail\.(by|from|kind)_|zone\.new_)/;
+const MADE = /^(lane|state|status|phone|alerts\.new_|handle|kind|map\.outside|value|destination|event|mail|part|plans\.how|columns|layers|rule|severity|word|say|trail\.(by|from|kind)_|zone\.new_)/;
 
 const sources = readdirSync(PAGE, { recursive: true, encoding: "utf8" })
   .filter((name) => /\.(js|html)$/.test(name) && !name.startsWith(join("i18n", "en")) && !name.startsWith(join("i18n", "de")))

@@ -25,8 +25,9 @@ def test_no_violation_while_a_base_map_is_shown_and_hidden(chromium: Browser, ax
         place.move("cart", x=20.0, y=10.0)
         page.wait_for("dropanchor.basemap().tiles > 0 && dropanchor.tags().length === 1")
         assert violations(page.page, axe) == []
+        page.page.locator("#options").click()
         page.page.locator("#basemap").focus()
-        page.page.keyboard.press("Enter")
-        expect(page.page.get_by_role("button", name="Hintergrundkarte")).to_have_attribute("aria-pressed", "false")
+        page.page.keyboard.press("Space")
+        expect(page.page.get_by_label("Hintergrundkarte")).not_to_be_checked()
         assert violations(page.page, axe) == []
         assert page.errors == []

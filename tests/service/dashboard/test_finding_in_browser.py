@@ -83,6 +83,22 @@ def test_enter_selects_the_only_hit_and_arrows_choose_among_several(chromium: Br
         assert page.errors == []
 
 
+def check_colours(page: WatchedPage) -> None:
+    """Each of the selected tags has a colour of its own: in the list, in the comparison and around its dot."""
+    page.wait_for("dropanchor.drawing().still")
+    known, seen = page.tags(), []
+    places = [known[tag]["pixel"] for tag in ("cart-1", "van")]
+    pixels = page.pixels([(x + dx, y + dy) for x, y in places for dx, dy in ((-11.5, 0), (0, 11.5), (0, -11.5))])
+    for number, tag in enumerate(("cart-1", "van")):
+        cells = [f"tr[data-tag='{tag}'] .c-tag", f"#comparison th:text-is('{tag}')"]
+        marks = [page.page.locator(one).evaluate("one => one.style.getPropertyValue('--mark')") for one in cells]
+        ring = tuple(int(marks[0][at : at + 2], 16) for at in (1, 3, 5))
+        around = pixels[3 * number : 3 * number + 3]
+        assert any(pixel[:3] == pytest.approx(ring, abs=40) for pixel in around), (ring, around)
+        seen.append(marks)
+    assert seen[0][0] == seen[0][1] != seen[1][0] == seen[1][1]
+
+
 def test_several_tags_are_selected_by_mouse_keys_and_rectangle_compared_and_followed(
     chromium: Browser, place: Place, axe: str
 ) -> None:
@@ -95,6 +111,7 @@ def test_several_tags_are_selected_by_mouse_keys_and_rectangle_compared_and_foll
         expect(title).to_have_text("2 tags selected")
         expect(page.page.locator("#detail")).to_be_hidden()
         assert selected(page) == ["cart-1", "van"]
+        check_colours(page)
         map_.click(position=at(page, "cart-12"), modifiers=["Control"])
         expect(title).to_have_text("3 tags selected")
         map_.click(position=at(page, "cart-12"), modifiers=["Control"])

@@ -26,7 +26,7 @@ def opened_keys(chromium: Browser, port: int, key: str) -> Iterator[tuple[Watche
         page.page.locator("#key").fill(key)
         page.page.keyboard.press("Enter")
         page.wait_for("window.dropanchor?.status() === 'live'")
-        page.page.get_by_role("button", name="Display").click()
+        page.page.get_by_role("button", name="Links and keys").click()
         yield page, page.page.get_by_role("region", name="Keys")
 
 

@@ -70,7 +70,7 @@ def test_every_panel_opens_from_every_other_and_asks_only_when_something_typed_w
         page.wait_for("dropanchor.events() && dropanchor.destinations().length === 1")
         assert set(page.page.evaluate("Object.keys(dropanchor.panels())")) == {
             *("tag", "start", "anchors", "plans", "zone", "destination", "rule", "measure"),
-            *("past", "heat", "figures", "display", "keys", "several", "trail"),
+            *("past", "heat", "figures", "display", "sharing", "keys", "several", "trail"),
         }
         expect(page.page.locator("[data-part=new-rule] button")).to_have_count(4)
         assert page.page.evaluate(WALK) == []

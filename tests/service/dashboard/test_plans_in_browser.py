@@ -272,7 +272,7 @@ def test_a_file_that_is_refused_says_why_and_every_other_kind_is_shown(chromium:
             image = place.plans.all[uploaded["name"][0]].image
             assert (image.width_px, image.height_px) == size
             page.wait_for(f"dropanchor.plans().filter(({{ isReady }}) => isReady).length === {len(place.plans.all)}")
-            form.get_by_role("button", name="Cancel").click()
+            panel.get_by_role("button", name="Add plan…").click()
         expect(panel.get_by_label("Page")).to_be_hidden()
         panel.get_by_label("File").set_input_files(file("hall.pdf", "application/pdf", pdf_file((72, 72), (144, 72))))
         panel.get_by_label("Page").fill("2")

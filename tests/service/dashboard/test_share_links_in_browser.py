@@ -35,7 +35,7 @@ def test_a_link_of_a_group_is_created_copied_used_and_revoked(chromium: Browser,
             boss.page.locator("#key").fill(secret)
             boss.page.keyboard.press("Enter")
             boss.page.locator("#group").select_option("vans")
-            boss.page.get_by_role("button", name="Display").click()
+            boss.page.get_by_role("button", name="Links and keys").click()
             boss.page.get_by_label("What it is for").fill("Visitors")
             boss.page.get_by_label("It shows").select_option("Only the group vans")
             boss.page.get_by_role("button", name="Create link").click()
@@ -50,7 +50,7 @@ def test_a_link_of_a_group_is_created_copied_used_and_revoked(chromium: Browser,
                 guest.page.locator("tr[data-tag='van']").click()
                 for part in ("#edit", "#detail .settings", ".zones", "[data-part='json']"):
                     expect(guest.page.locator(part)).to_be_hidden()
-                guest.page.get_by_role("button", name="Display").click()
+                guest.page.get_by_role("button", name="Links and keys").click()
                 expect(guest.page.locator("#link")).to_contain_text("share=")
                 expect(guest.page.locator("#share")).to_be_hidden()
                 guest.page.keyboard.press("Escape")
@@ -85,7 +85,7 @@ def test_without_access_control_the_page_offers_no_share_link(chromium: Browser)
         watched_page(chromium, f"http://127.0.0.1:{port}/") as page,
     ):
         with page.page.expect_response(lambda response: response.url.endswith("/shares")):
-            page.page.get_by_role("button", name="Display").click()
+            page.page.get_by_role("button", name="Links and keys").click()
         expect(page.page.locator("#link")).to_contain_text("http")
         expect(page.page.locator("#share")).to_be_hidden()
         assert page.errors == []

@@ -49,7 +49,7 @@ def test_the_overview_leads_to_the_page_of_a_site_and_its_chooser_to_another(chr
 
         page.get_by_role("row").get_by_role("link", name="Lager Süd").click()
         watched.wait_for("window.dropanchor?.tags().length === 1 && dropanchor.tags()[0].x === 2")
-        page.get_by_role("button", name="Display").click()
+        page.get_by_role("button", name="Links and keys").click()
         expect(page.locator("#share")).to_be_hidden()  # without access control there is nothing to share
         page.keyboard.press("Escape")
         expect(page.locator("#zones")).to_be_visible()

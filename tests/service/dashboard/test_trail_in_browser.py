@@ -162,7 +162,7 @@ def test_who_may_not_write_gets_no_buttons_and_a_link_no_dialog(chromium: Browse
         with open_page(chromium, f"{url}#share={yard.secrets['link']}") as guest:
             guest.wait_for("window.dropanchor?.status() === 'live'")
             guest.page.locator("#options").click()
-            expect(guest.page.locator("#link")).to_be_visible()
+            expect(guest.page.locator("#language")).to_be_visible()
             expect(guest.page.locator("#show-trail")).to_be_hidden()
 
 

@@ -1,12 +1,14 @@
 """A person chooses the units of lengths and speeds; what is stored and sent stays SI."""
 
+import re
+
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, expect
 
 from dropanchor_schemas.zones import Circle
 from service.dashboard.zone_place import ZonePlace, disc, served, zone_place
-from support.browser import watched_page
+from support.browser import WatchedPage, watched_page
 from support.zenoh_router import wait_until
 
 pytestmark = pytest.mark.browser
@@ -56,6 +58,7 @@ def test_units_are_chosen_remembered_and_used_everywhere_while_settings_stay_si(
         page.get_by_role("button", name="Save zone").click()
         wait_until(lambda: radius_of(place) == pytest.approx(6.096))
         page.locator("#edit").click()
+        assert not re.search(r"\d m\b", page.locator("#setup").inner_text())
         page.locator("#setup [data-part='new']").click()
         page.locator("#setup [name='id']").fill("north")
         page.locator("#setup [name='y']").fill("100")
@@ -66,3 +69,23 @@ def test_units_are_chosen_remembered_and_used_everywhere_while_settings_stay_si(
         assert [north.x, north.y] == pytest.approx([0.0, 30.48])
         watched.wait_for("dropanchor.drawing().still")
         assert watched.errors == []
+        check_layers(watched)
+
+
+def check_layers(watched: WatchedPage) -> None:
+    """Hide zones, rings and names. The selected tag keeps its name, and the browser remembers the choice."""
+    page = watched.page
+    page.locator("#fit").click()
+    watched.wait_for("dropanchor.drawing().still && dropanchor.drawing().labels.length === 1")
+    shown = watched.pixel(*page.evaluate("dropanchor.screen(4.1, 1.3)"))  # in the zone
+    page.locator("#options").click()
+    for layer in ("Zones", "Rings of distance", "Names"):
+        page.get_by_role("group", name="Layers of the map").get_by_label(layer).uncheck()
+    watched.wait_for("dropanchor.drawing().still && dropanchor.drawing().labels.length === 0")
+    hidden = watched.pixel(*page.evaluate("dropanchor.screen(4.1, 1.3)"))
+    assert hidden != shown
+    page.reload()
+    watched.wait_for("dropanchor.drawing().still && dropanchor.tags().length === 1")
+    assert watched.pixel(*page.evaluate("dropanchor.screen(4.1, 1.3)")) == hidden
+    page.locator("tr[data-tag='cart']").click()
+    watched.wait_for("dropanchor.drawing().labels.length === 1")

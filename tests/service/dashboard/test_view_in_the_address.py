@@ -48,7 +48,7 @@ def test_a_copied_link_shows_the_same_tag_map_filter_language_and_units(chromium
         page.page.keyboard.press("ArrowLeft")
         page.wait_for(f"location.hash.includes('group=') && {IS_WRITTEN}")
         link, view = page.page.url, page.page.evaluate(VIEW)
-        page.page.get_by_role("button", name="Anzeige").click()
+        page.page.get_by_role("button", name="Links und Schlüssel").click()
         expect(page.page.locator("#link")).to_have_text(link)
         assert page.errors == []
     with watched_page(chromium, link) as page:

@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 globalThis.location = /** @type {any} */ ({ search: "?length=ft", hash: "#velocity=kmh" });
 const PAGE = "../../../service/dropanchor_service/dashboard";
-const { accuracy, coordinate, distance, half, length, place, speed } = await import(`${PAGE}/data/format.js`);
+const { accuracy, coordinate, distance, half, length, place, speed, withUnits } = await import(`${PAGE}/data/format.js`);
 const { readMeasure, units, writeMeasure } = await import(`${PAGE}/data/units.js`);
 const { roundLength } = await import(`${PAGE}/map/view.js`);
 
@@ -22,6 +22,10 @@ test("lengths are written in feet and speeds in kilometres per hour", () => {
   assert.equal(speed(10), "36.00 km/h");
   assert.equal(length(NaN), "–");
   assert.equal(speed(null), "– km/h");
+});
+
+test("metres in a sentence of the service are written in feet", () => {
+  assert.equal(withUnits("± 3.048 m, of which 0,3048 m come from north. 9 m/s, 2 m², 5 min"), "± 10 ft, of which 1 ft come from north. 9 m/s, 2 m², 5 min");
 });
 
 test("the scale of the map is round in the unit of the page", () => {

@@ -1,7 +1,8 @@
 /** Connect the base map: what the service has, the frame of the site, the switch, the attribution and the map. */
 
-import { addressValues, writeAddress } from "../data/address.js";
+import { writeAddress } from "../data/address.js";
 import { api, getJson } from "../data/connection.js";
+import { chosen, remember } from "../data/display.js";
 import { isLimited } from "../data/shared.js";
 import { Painter } from "./painter.js";
 import { PaintingThread } from "./thread.js";
@@ -22,18 +23,19 @@ export class Basemap {
   #isOn = true;
 
   /** @param {import("../map/map.js").LiveMap} map @param {import("../data/connection.js").Connection} connection
-   * @param {HTMLElement} button turns it on and off @param {HTMLElement} attribution */
-  constructor(map, connection, button, attribution) {
+   * @param {HTMLInputElement} tick turns it on and off @param {HTMLElement} attribution */
+  constructor(map, connection, tick, attribution) {
     this.map = map;
-    this.button = button;
+    this.tick = tick;
     this.attribution = attribution;
     this.painter = new Painter(this.thread, this.tiles, () => map.redraw());
     map.underlays.unshift(({ ctx, view, palette }) => {
       if (this.#isShown && this.#description && this.#origin) this.painter.draw(ctx, view, palette, this.#description, this.#origin);
     });
     this.tiles.addEventListener("change", () => map.redraw());
-    button.addEventListener("click", () => {
-      writeAddress({ basemap: this.#isOn ? OFF : null });
+    tick.addEventListener("change", () => {
+      remember({ basemap: tick.checked ? "on" : OFF });
+      writeAddress({ basemap: tick.checked ? null : OFF });
       this.#update();
     });
     addEventListener("hashchange", () => this.#update());
@@ -67,9 +69,8 @@ export class Basemap {
   }
 
   #update() {
-    this.#isOn = addressValues().get("basemap") !== OFF;
-    this.button.hidden = this.#description === null || this.#origin === null;
-    this.button.setAttribute("aria-pressed", String(this.#isOn));
+    this.#isOn = this.tick.checked = chosen("basemap", null) !== OFF;
+    /** @type {HTMLElement} */ (this.tick.parentElement).hidden = this.#description === null || this.#origin === null;
     this.attribution.hidden = !this.#isShown || this.attribution.childNodes.length === 0;
     this.map.redraw();
   }

@@ -143,5 +143,9 @@ export const ago = (seconds) => t("ago", { age: age(seconds) });
 
 export { count };
 
+/** Return a text of the catalogue or of the service with its metres in the unit of the page. @param {string} text */
+export const withUnits = (text) => (units.length.factor === 1 ? text
+  : text.replace(/(\d+(?:[.,]\d+)?) m(?![\w/²])/g, (_, metres) => `${decimal(Number(metres.replace(",", ".")) * units.length.factor, 0, 2)} ${units.length.symbol}`));
+
 /** Return a machine-readable name in words: `several_modes` → "several modes". @param {string} word */
 export const words = (word) => (has(`word.${word}`) ? t(`word.${word}`) : word.replaceAll("_", " "));

@@ -1,5 +1,6 @@
 /** Put the messages of the language into a document. Its elements name the messages in `data-i18n…` attributes. */
 
+import { withUnits } from "../data/format.js";
 import { installUnits } from "../data/units.js";
 import { LANGUAGES, language, t } from "./language.js";
 
@@ -10,7 +11,7 @@ const NAMES = Object.keys(ATTRIBUTES).map((name) => `[data-${name.replace("i18n"
 export function translate(page) {
   page.documentElement.lang = language;
   installUnits(page);
-  for (const element of page.querySelectorAll("[data-i18n]")) fill(element, t(/** @type {HTMLElement} */ (element).dataset.i18n ?? ""));
+  for (const element of page.querySelectorAll("[data-i18n]")) fill(element, withUnits(t(/** @type {HTMLElement} */ (element).dataset.i18n ?? "")));
   for (const element of page.querySelectorAll(NAMES.join())) {
     for (const [name, attribute] of Object.entries(ATTRIBUTES)) {
       const key = /** @type {HTMLElement} */ (element).dataset[name];

@@ -1,6 +1,7 @@
 /** What the service says, in the words and the language of the page: found by the code of a sentence, not by its text. */
 
 import { UnreachableError } from "../data/access.js";
+import { withUnits } from "../data/format.js";
 import { decimal, has, language, t } from "./language.js";
 
 /** @typedef {{code: string, values: Record<string, string>}} Phrase as in the contract */
@@ -11,7 +12,7 @@ const SHOWN_PARTS = 3;
 
 /** Return a sentence of the service in the words of the page; one that the page does not know, as the service says it.
  * @param {string} text @param {Phrase | null} [phrase] */
-export const said = (text, phrase) => known(text, phrase) ?? text;
+export const said = (text, phrase) => withUnits(known(text, phrase) ?? text);
 
 /** Return why something failed, in the language of the page. @param {unknown} error */
 export function refusal(error) {

@@ -114,12 +114,12 @@ export function drawColours({ ctx, view, fleet, rows }) {
 }
 
 /** @param {Scene} scene */
-export function drawSelection({ ctx, view, palette, fleet, chosen, hovered, rows }) {
+export function drawSelection({ ctx, view, palette, fleet, chosen, colourOf, hovered, rows }) {
   const radius = markerRadius(rows.length);
   for (const [row, width] of [[hovered, 1.5], ...chosen.map((row) => [row, 2.5])]) {
     if (row < 0 || Number.isNaN(fleet.drawnX[row])) continue;
     ctx.beginPath();
     ctx.arc(view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row]), radius + 6, 0, 2 * Math.PI);
-    haloStroke(ctx, palette, palette.accent, width);
+    haloStroke(ctx, palette, colourOf(row) || palette.accent, width);
   }
 }

@@ -9,9 +9,9 @@ const RING_PX = 7;
 
 /** @typedef {Pick<import("../data/tracks.js").Track, "time" | "x" | "y" | "since" | "off_m">} Line @typedef {import("./scene.js").Scene} Scene */
 
-/** @param {Scene} scene @param {Line} track @param {string} [colour] of the tag; empty: none */
-export function drawTrack({ ctx, view, palette }, track, colour = "") {
-  ctx.strokeStyle = colour || palette.accent;
+/** @param {Scene} scene @param {Line} track @param {string} colour */
+export function drawTrack({ ctx, view }, track, colour) {
+  ctx.strokeStyle = colour;
   ctx.lineWidth = 1.5;
   ctx.lineJoin = "round";
   ctx.globalAlpha = 0.55;

@@ -14,6 +14,7 @@ import { union } from "./outside.js";
 import { placesToFit } from "./places_to_fit.js";
 import { readPalette, withoutStates } from "./palette.js";
 import { nearest, rowsInView } from "./scene.js";
+import { LAYERS, Ticks } from "../data/ticks.js";
 import { View, boundsAround, limited } from "./view.js";
 
 const SMOOTH_UP_TO = 1000;
@@ -34,6 +35,7 @@ export class LiveMap extends EventTarget {
   hovered = -1;
   /** Boxes of buttons on the map that no name may stand below. @type {number[][]} */
   hints = [];
+  layers = new Ticks("layers", LAYERS);
   /** Draw on the grid, below everything else. @type {((scene: import("./scene.js").Scene) => void)[]} */
   underlays = [];
   /** Draw over everything else. @type {((scene: import("./scene.js").Scene) => void)[]} */
@@ -73,7 +75,7 @@ export class LiveMap extends EventTarget {
     this.#ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     new ResizeObserver(() => this.#resize()).observe(canvas);
     choice.addEventListener("change", () => this.redraw());
-    evidence.addEventListener("change", () => this.redraw());
+    for (const source of [evidence, this.layers]) source.addEventListener("change", () => this.redraw());
   }
 
   /** Whether the map is up to date: no drawing is scheduled, and the view does not move. */
@@ -255,13 +257,14 @@ export class LiveMap extends EventTarget {
     const scene = {
       ctx: this.#ctx, view, palette, fleet, trails: this.trails, roster: this.roster, anchors: this.anchors,
       rows: here, selected: fleet.row(choice.selected), chosen: choice.tags.map((tag) => fleet.row(tag)).filter((row) => row >= 0), hovered: this.hovered, now_ms,
+      colourOf: (/** @type {number} */ row) => choice.colourOf(fleet.names[row]),
     };
     this.#ctx.setTransform(this.#pixelRatio, 0, 0, this.#pixelRatio, 0, 0);
     this.#ctx.clearRect(0, 0, view.width, view.height);
     drawGrid(this.#ctx, view, palette);
     for (const draw of this.underlays) draw(scene);
     const centre = this.anchors.find((anchor) => anchor.id === fleet.value.anchor[scene.selected]) ?? this.anchors[0];
-    if (centre) drawRings(this.#ctx, view, palette, centre);
+    if (centre && this.layers.isShown("rings")) drawRings(this.#ctx, view, palette, centre);
     drawElsewhere(scene, elsewhere);
     this.stats.elsewhere = elsewhere.length;
     this.#drawTags(scene, (row) => this.isShown(row));
@@ -274,20 +277,22 @@ export class LiveMap extends EventTarget {
     const density = scene.rows.length > DENSITY_ABOVE;
     this.stats = { ...this.stats, visible: scene.rows.length, density };
     drawRangeRings(scene, isShown);
+    const only = { ...scene, rows: Int32Array.from(scene.chosen) };
+    const of = (/** @type {string} */ layer) => (this.layers.isShown(layer) ? scene : only);
     if (density) drawDensity(scene);
-    else drawEllipses(scene);
+    else drawEllipses(of("ellipses"));
     drawTurn(scene, this.evidence.of(this.choice.selected));
     drawEvidence(scene, this.evidence.of(this.choice.selected));
     for (const tag of this.choice.tags.slice(0, MOST_TRACKS)) {
       const track = this.trackOf(tag);
-      if (track) drawTrack(scene, track, scene.fleet.colours[scene.fleet.row(tag)]);
+      if (track) drawTrack(scene, track, this.choice.colourOf(tag));
     }
-    drawTrails(scene);
+    drawTrails(of("trails"));
     drawAnchors(scene.ctx, scene.view, scene.palette, scene.anchors);
     drawGhosts(scene, isShown);
-    const apart = density ? { ...scene, rows: Int32Array.from(scene.chosen) } : scene;
+    const apart = density ? only : scene;
     drawSelection(apart);
-    this.stats.labels = this.#labels.draw(apart, this.hints);
+    this.stats.labels = this.#labels.draw(density ? only : of("names"), this.hints);
     drawMarkers(apart);
     drawColours(apart); // above the halos of the dots
   }

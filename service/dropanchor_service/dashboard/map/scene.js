@@ -12,6 +12,7 @@
  * @property {Int32Array} rows visible tags
  * @property {number} selected row, or −1
  * @property {readonly number[]} chosen rows of the selected tags: none, one or several
+ * @property {(row: number) => string} colourOf a selected tag
  * @property {number} hovered row, or −1
  * @property {number} now_ms
  */

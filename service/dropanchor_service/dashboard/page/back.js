@@ -7,7 +7,7 @@ import { isKiosk } from "./kiosk.js";
 
 /** What *Back* closes first. @type {readonly import("./one_panel.js").PanelName[]} */
 const ORDER = [
-  "trail", "keys", "display", "figures", "measure", "start", "zone", "rule", "destination", "plans", "anchors", "several", "tag", "heat", "past",
+  "trail", "keys", "display", "sharing", "figures", "measure", "start", "zone", "rule", "destination", "plans", "anchors", "several", "tag", "heat", "past",
 ];
 
 export class Back {

@@ -5,7 +5,12 @@ import { STATES } from "../data/states.js";
 /** More would fit neither an address nor a table that people compare. */
 export const MOST_SELECTED = 300;
 
+/** Colours of selected tags, which differ for people with any colour vision, on light and on dark. */
+export const COLOURS = ["#2f7fd0", "#873df5", "#d65c8d", "#7c5e3c", "#e9470c"];
+
 export class Choice extends EventTarget {
+  /** @type {Map<string, string>} */
+  #colours = new Map();
   /** @type {readonly string[]} */
   #tags = [];
   #gathering = false;
@@ -67,8 +72,24 @@ export class Choice extends EventTarget {
     const isGathering = gathering && tags.length > 0;
     if (isGathering === this.#gathering && tags.join("\n") === this.#tags.join("\n")) return;
     [this.#tags, this.#gathering] = [tags, isGathering];
+    this.#colour();
     if (tags.length === 0) this.#follow = false;
     this.#changed();
+  }
+
+  /** Give each selected tag a colour, which it keeps while it is selected. */
+  #colour() {
+    const kept = [...this.#colours].filter(([tag]) => this.#tags.includes(tag));
+    const free = COLOURS.filter((one) => !kept.some(([, taken]) => taken === one));
+    this.#colours = new Map(kept);
+    for (const tag of this.#tags) {
+      if (!this.#colours.has(tag)) this.#colours.set(tag, free.shift() ?? COLOURS[this.#colours.size % COLOURS.length]);
+    }
+  }
+
+  /** Return the colour of a selected tag in the list, on the map and over time; empty: it is not selected. @param {string} tag */
+  colourOf(tag) {
+    return this.#colours.get(tag) ?? "";
   }
 
   get follow() {

@@ -11,6 +11,7 @@ const SITE = "how-to/set-up-a-site.md";
  * @type {Record<Exclude<import("./one_panel.js").PanelName, "keys">, string>} */
 export const GUIDES = {
   display: PAGE,
+  sharing: "how-to/secure-a-site.md",
   trail: PAGE + "#settings-and-changes",
   figures: PAST + "#figures-of-all-tags",
   start: SITE + "#say-where-a-tag-is",

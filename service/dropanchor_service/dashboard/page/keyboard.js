@@ -1,5 +1,6 @@
 /** The keys of the whole page, and the dialog (`?`) that lists all keys. */
 
+import { withUnits } from "../data/format.js";
 import { t } from "../i18n/language.js";
 
 /** The keys, with the messages that name those without a sign of their own, and what they do. @type {[string[], string][]} */
@@ -17,7 +18,7 @@ export const isTyping = ({ target }) => target instanceof Element && target.matc
 /** @param {HTMLDialogElement} dialog @param {HTMLElement} filter field that `/` goes to @param {() => void} help */
 export function installKeyboard(dialog, filter, help) {
   const list = /** @type {HTMLElement} */ (dialog.querySelector("dl"));
-  list.append(...KEYS.map(([keys, message]) => line(keys, t(message))));
+  list.append(...KEYS.map(([keys, message]) => line(keys, withUnits(t(message)))));
   document.addEventListener("keydown", (event) => {
     if (isTyping(event) || event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]")) return;
     if (event.key === "?") help();

@@ -73,6 +73,7 @@ const basemap = new Basemap(map, connection, byId("basemap"), byId("attribution"
 const notices = new Notices(connection, fleet);
 const columns = new Columns(fleet);
 columns.offer(byId("columns"));
+map.layers.offer(byId("layers"));
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, columns, (tags, pick) => finding.pick(tags, pick));
 
 table.isElsewhere = (/** @type {number} */ row) => map.isElsewhere(row);
@@ -235,6 +236,7 @@ new Kiosk({
 listen(map, (row, isAlso) => finding.pickOnMap(row, isAlso));
 installTheme(byId("theme"), () => map.recolour());
 installDialog(byId("options"), /** @type {HTMLDialogElement} */ (byId("display")), panels, "display");
+installDialog(byId("share-with"), /** @type {HTMLDialogElement} */ (byId("sharing")), panels, "sharing");
 const keys = /** @type {HTMLDialogElement} */ (byId("keys"));
 const showKeys = () => {
   leadTo(byId("guide"), guideTo(panels.states, document.querySelector("#zones > details[open]") !== null));
@@ -249,9 +251,9 @@ installSections(document, panels);
 installRoom(byId);
 const share = new SharePanel(byId("share"), choice);
 const accessKeys = new KeyPanel(byId("access-keys"));
-byId("options").addEventListener("click", () => {
+byId("options").addEventListener("click", () => (/** @type {HTMLAnchorElement} */ (byId("kiosk-link")).href = kioskAddress(location)));
+byId("share-with").addEventListener("click", () => {
   byId("link").textContent = location.href;
-  /** @type {HTMLAnchorElement} */ (byId("kiosk-link")).href = kioskAddress(location);
   share.open();
   accessKeys.open();
 });

@@ -21,6 +21,7 @@ export const PLACES = {
   heat: [],
   figures: ["window"],
   display: ["window"],
+  sharing: ["window"],
   keys: ["window"],
   trail: ["window"],
 };

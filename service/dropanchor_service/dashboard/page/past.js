@@ -96,7 +96,9 @@ export class Past {
     const { from_ms, to_ms } = this.replay;
     if (!this.active) this.#tracks.request(this.page.choice.tags);
     else if (from_ms < to_ms) this.#tracks.requestPeriod(this.page.choice.tags, from_ms, to_ms);
-    this.lane.show(this.active ? this.#trackOf(this.page.choice.selected) ?? null : null);
+    const { selected } = this.page.choice;
+    this.lane.box.style.setProperty("--track", this.page.choice.colourOf(selected ?? ""));
+    this.lane.show(this.active ? this.#trackOf(selected) ?? null : null);
   }
 
   enter() {

@@ -1,7 +1,7 @@
 /** The columns of the table beside the name: what stands in them, and which of them a person wants to see. */
 
 import { UNKNOWN, age, coordinate, half, percent, speedNumber } from "../data/format.js";
-import { chosen, remember } from "../data/display.js";
+import { Ticks } from "../data/ticks.js";
 import { t } from "../i18n/language.js";
 
 /** As they stand in the document. Those in `ASKED_FOR` are there only for who asks for them. */
@@ -11,39 +11,14 @@ const ASKED_FOR = ["zone", "floor", "battery", "stopped"];
 /** @typedef {{zonesOf: (tag: string) => readonly string[], batteryOf: (tag: string) => number}} About what is known of a tag beside its pose; NaN: it is not */
 
 /** Event: "change". */
-export class Columns extends EventTarget {
+export class Columns extends Ticks {
   /** @type {About} */
   about = { zonesOf: () => [], batteryOf: () => NaN };
-  #shown = new Set((chosen("columns", null) ?? COLUMNS.filter((name) => !ASKED_FOR.includes(name)).join()).split(","));
 
   /** @param {import("../data/fleet.js").Fleet} fleet */
   constructor(fleet) {
-    super();
+    super("columns", COLUMNS, ASKED_FOR);
     this.fleet = fleet;
-  }
-
-  /** @param {string} name */
-  isShown(name) {
-    return this.#shown.has(name);
-  }
-
-  /** Offer all columns. @param {HTMLElement} box */
-  offer(box) {
-    box.append(...COLUMNS.map((name) => {
-      const label = Object.assign(document.createElement("label"), { className: "check" });
-      const tick = Object.assign(document.createElement("input"), { type: "checkbox", checked: this.isShown(name) });
-      tick.addEventListener("change", () => this.#show(name, tick.checked));
-      label.append(tick, ` ${t(`columns.${name}`)}`);
-      return label;
-    }));
-  }
-
-  /** @param {string} name @param {boolean} on */
-  #show(name, on) {
-    if (on) this.#shown.add(name);
-    else this.#shown.delete(name);
-    remember({ columns: [...this.#shown].join() });
-    this.dispatchEvent(new Event("change"));
   }
 
   /** Return what stands in a column. @param {string} name @param {number} row @param {number} now_ms @returns {string} */

@@ -11,11 +11,13 @@ import { write } from "../page/parts.js";
 export class Comparison {
   #shape = "";
 
-  /** @param {HTMLTableElement} table @param {import("../data/fleet.js").Fleet} fleet @param {import("../data/roster.js").Roster} roster */
-  constructor(table, fleet, roster) {
+  /** @param {HTMLTableElement} table @param {import("../data/fleet.js").Fleet} fleet @param {import("../data/roster.js").Roster} roster
+   * @param {import("../page/choice.js").Choice} choice */
+  constructor(table, fleet, roster, choice) {
     this.table = table;
     this.fleet = fleet;
     this.roster = roster;
+    this.choice = choice;
   }
 
   /** @param {readonly string[]} tags */
@@ -30,6 +32,7 @@ export class Comparison {
       head.replaceChildren(lineOf(columns.map(({ title }) => title), "col"));
       body.replaceChildren(...lines.map((texts) => lineOf(texts, "row")));
     }
+    rows.forEach((row, at) => body.rows[at].cells[0].style.setProperty("--mark", this.choice.colourOf(this.fleet.names[row])));
     lines.forEach((texts, at) => texts.forEach((text, place) => write(body.rows[at].cells[place], text))); // the cells stay, and so does what is marked in them
   }
 

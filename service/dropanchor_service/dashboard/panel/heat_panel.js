@@ -22,7 +22,7 @@ export class HeatPanel {
     this.choice = choice;
     this.fleet = liveMap.fleet;
     this.#unfold(!matchMedia("(max-width: 800px)").matches); // on a phone it would cover half of the map
-    liveMap.underlays.push((scene) => this.#painter.draw(this.map, scene));
+    liveMap.underlays.push((scene) => liveMap.layers.isShown("heat") && this.#painter.draw(this.map, scene));
     button.addEventListener("click", () => this.#turn(!this.map.active));
     replay.addEventListener("period", () => this.update());
     choice.addEventListener("change", () => this.map.active && this.update());

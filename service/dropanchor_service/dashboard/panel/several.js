@@ -21,7 +21,7 @@ export class SeveralPanel {
     this.choice = choice;
     this.changes = changes;
     this.past = past;
-    this.comparison = new Comparison(/** @type {HTMLTableElement} */ (panel.querySelector("table")), fleet, roster);
+    this.comparison = new Comparison(/** @type {HTMLTableElement} */ (panel.querySelector("table")), fleet, roster, choice);
     this.group = /** @type {HTMLFormElement} */ (partOf(this.panel, "group"));
     this.tracks = new TracksExport(/** @type {HTMLFormElement} */ (partOf(this.panel, "export")), choice, past);
     /** @type {HTMLDetailsElement} */ (partOf(this.panel, "more")).open = this.#isCompared;

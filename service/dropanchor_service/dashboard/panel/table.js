@@ -169,7 +169,7 @@ export class TagTable {
     set(line.element.dataset, "elsewhere", String(isElsewhere));
     attribute(line.cells[0], "title", words);
     attribute(line.cells[0], "aria-label", words);
-    line.cells[0].style.setProperty("--mark", fleet.colours[row] || "transparent");
+    line.cells[0].style.setProperty("--mark", this.choice.colourOf(name) || fleet.colours[row] || "transparent");
     /** @type {HTMLTableCellElement} */ (line.cells.at(-1)).classList.toggle("yes", fleet.current && fleet.online[row] === 1);
   }
 

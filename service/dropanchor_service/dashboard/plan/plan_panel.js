@@ -3,6 +3,7 @@
 import { confirmed } from "../setup/confirm.js";
 import { PlanPoints } from "./plan_points.js";
 import { isWorldFile, worldOf } from "./world_file.js";
+import { withUnits } from "../data/format.js";
 import { readMeasure, writeMeasure } from "../data/units.js";
 import { t } from "../i18n/language.js";
 import { begun, refusal } from "../i18n/said.js";
@@ -30,6 +31,7 @@ export class PlanPanel {
     panels.add("plans", { isOpen: () => editor.isOpen, isUnsaved: () => editor.isUnsaved, saving: () => editor.saving.now, leave: () => editor.close() });
     toggle.addEventListener("click", () => panels.toggle("plans", () => editor.open()));
     partOf(this.panel, "close").addEventListener("click", () => panels.close("plans"));
+    partOf(this.panel, "new").addEventListener("click", () => panels.open("plans", () => editor.discard()));
     partOf(this.panel, "delete").addEventListener("click", () => this.#delete());
     partOf(this.panel, "move").addEventListener("click", () => editor.setMode("move"));
     partOf(this.panel, "pick").addEventListener("click", () => editor.setMode("pick"));
@@ -60,9 +62,10 @@ export class PlanPanel {
     this.#fillList();
     this.form.hidden = editor.draft === null;
     this.upload.hidden = editor.draft !== null;
+    partOf(this.panel, "new").hidden = editor.draft === null;
     partOf(this.panel, "delete").hidden = !changes.mayDelete;
     for (const mode of /** @type {const} */ (["move", "pick"])) partOf(this.panel, mode).setAttribute("aria-pressed", String(editor.mode === mode));
-    writeOrHide(partOf(this.panel, "how"), editor.mode === "" ? "" : t(editor.isBeside ? "plans.how_beside" : `plans.how_${editor.mode}`));
+    writeOrHide(partOf(this.panel, "how"), editor.mode === "" ? "" : withUnits(t(editor.isBeside ? "plans.how_beside" : `plans.how_${editor.mode}`)));
     if (!editor.isOpen) this.#say("");
     if (editor.draft) this.#fillForm(editor.draft);
     this.points.update();

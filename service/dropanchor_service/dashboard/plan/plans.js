@@ -46,7 +46,7 @@ export class Plans {
   /** Return the plans of the chosen floor, and the one that is being edited as it is now. */
   #shown() {
     const { draft } = this.editor;
-    return this.store.plans.map((plan) => (plan.id === draft?.id ? draft : plan)).filter((plan) => plan === draft || this.floors.shows(plan));
+    return this.store.plans.map((plan) => (plan.id === draft?.id ? draft : plan)).filter((plan) => plan === draft || (this.map.layers.isShown("plans") && this.floors.shows(plan)));
   }
 
   #takePlans() {

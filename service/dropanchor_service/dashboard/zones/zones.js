@@ -191,7 +191,7 @@ export class Zones {
   #draw(scene) {
     const { zone } = this.editor;
     const others = this.store.zones.filter(({ id }) => id !== zone?.id);
-    drawZones(scene, others, this.store.inside, this.selected);
+    drawZones(scene, this.map.layers.isShown("zones") ? others : [], this.store.inside, this.selected);
     if (zone) {
       scene.ctx.save();
       drawShape(scene, zone.shape, { colour: zone.colour, dash: [], width: 2.5 });

@@ -1,6 +1,7 @@
 /** Sharing the page, and showing it on a wall. */
 
 export default {
+  "sharing.title": "Links und Schlüssel",
   "access.title": "Schlüssel",
   "access.what": "Wer einen Schlüssel hat, kann in dieser Site tun, was der Schlüssel erlaubt, bis er abläuft oder Sie ihn widerrufen.",
   "access.name": "Wer ihn bekommt",

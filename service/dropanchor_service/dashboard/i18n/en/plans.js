@@ -11,6 +11,7 @@ export default {
   "plans.page": "Page",
   "plans.crs": "Coordinate system",
   "plans.crs_title": "EPSG and a number, or site for the frame of the site",
+  "plans.new": "Add plan…",
   "plans.add": "Add plan",
   "plans.plan": "Floor plan",
   "plans.all_floors": "all floors",

@@ -1,6 +1,7 @@
 /** Sharing the page, and showing it on a wall. */
 
 export default {
+  "sharing.title": "Links and keys",
   "access.title": "Keys",
   "access.what": "Whoever has a key can do in this site what it allows, until it expires or you revoke it.",
   "access.name": "Who gets it",
