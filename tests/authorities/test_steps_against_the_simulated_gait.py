@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba import njit
 
 from dropanchor_service.estimation.fleet.frontend.gait import (
     FULL_SWING,
@@ -25,7 +24,6 @@ SEEDS = range(5900, 5906)
 STEP_HZ = (1.2, 2.6)
 
 
-@njit(cache=True)
 def detect(g: Any, t: Any, size: Any, steps: Any, speed: Any) -> None:
     start_gait(g, size[0])
     for k in range(1, len(t)):
@@ -33,12 +31,11 @@ def detect(g: Any, t: Any, size: Any, steps: Any, speed: Any) -> None:
         speed[k] = step_speed(g)
 
 
-@njit(cache=True)
 def count_regular(g: Any, t: Any, size: Any, regular: Any) -> None:
     start_gait(g, size[0])
     for k in range(1, min(len(t), len(regular))):
         add_step_sample(g, t[k] - t[k - 1], size[k])
-        regular[k] = g.regular
+        regular[k] = g["regular"]
 
 
 def walk_columns() -> tuple[Any, Any]:

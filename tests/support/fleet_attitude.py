@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.attitude import (
     ATTITUDE,
     TILT_SD,
@@ -18,13 +17,12 @@ from support.imu import G0, Motion
 Array = NDArray[Any]
 
 
-@njit(cache=True)
 def follow(a: Any, t: Array, acc: Array, gyro: Array, rest_until: float, q: Array) -> None:
     for k in range(len(t)):
         dt = t[k] - t[k - 1] if k else 0.0
         predict_attitude(a, dt, gyro[k], t[k] < rest_until)
         correct_tilt(a, dt, acc[k, 0], acc[k, 1], acc[k, 2], t[k] < rest_until, 0.0)
-        q[k] = a.q
+        q[k] = a["q"]
 
 
 def attitude_of(m: Motion, start: Array, rest_until: float = -1.0, bias_std: float = 0.0) -> tuple[Array, Array]:

@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from dropanchor_service.estimation.fleet.frontend.inertial import add_sample, close_node
@@ -20,7 +19,6 @@ def nanoseconds(t: Array) -> Array:
     return START_NS + np.round(t * 1e9).astype(np.int64)
 
 
-@njit(cache=True)
 def drive(f: Any, t: Array, acc: Array, gyro: Array, mag: Array, ends: Array, nodes: Array) -> None:
     """Feed the samples up to each end and close a node there. Then feed the samples after the last end."""
     k = 0

@@ -16,7 +16,7 @@ from dropanchor_service.estimation.fleet.engine import FleetEngine
 from support.fleet_runs import cut
 
 ROWS = ("S5/9-axis/nothing/unknown", "forklift/scalar/nothing/known", "walk-hand/6-axis/nothing/known")
-LAST_NS = 12_000_000_000
+LAST_NS = 8_000_000_000
 EXACT = 1e-6  # of a value, and absolute: compiled code fuses multiplications with additions, which rounds differently
 
 
@@ -39,7 +39,7 @@ def test_plain_python_estimates_what_compiled_code_does(tmp_path: Path) -> None:
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
     subprocess.run([sys.executable, "-c", program], env=environment, check=True)
     plain, compiled = np.load(file), poses()
-    assert len(plain) == len(compiled) > 300
+    assert len(plain) == len(compiled) > 200
     assert np.isfinite(plain["x"]).any()
     for name in plain.dtype.names:
         np.testing.assert_allclose(plain[name], compiled[name], rtol=EXACT, atol=EXACT, err_msg=name)

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.typing import NDArray
 
 from dropanchor_service.estimation.fleet.frontend.standstill import (
@@ -18,7 +17,6 @@ from dropanchor_service.estimation.fleet.frontend.standstill import (
 Array = NDArray[Any]
 
 
-@njit(cache=True)
 def watch_all(s: Any, dt: float, acc: Array, gyro: Array, bias: Array, rest: Array) -> None:
     start_standstill(s, acc[0], gyro[0])
     for k in range(len(acc)):
