@@ -13,7 +13,7 @@ import numpy as np
 
 from dropanchor_schemas.sentences import say
 
-VERSION = 9
+VERSION = 10
 """Number of the layout that this version writes. Raise it when a column of the state changes, in its name, its type or
 its meaning: `migrations.py` says what else to do."""
 READ_BEFORE = 2

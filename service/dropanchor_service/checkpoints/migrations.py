@@ -23,30 +23,7 @@ Fresh = Callable[[Array], Mapping[str, Array]]
 Steps = Mapping[int, Callable[[Snapshot], Snapshot]]
 
 SETTINGS = "engine.settings"
-
-
-def _names(found: Snapshot, array: str) -> tuple[str, ...]:
-    """Return the columns of an array of a snapshot, none if it is not there."""
-    return (found.arrays[array].dtype.names or ()) if array in found.arrays else ()
-
-
-HEADING_MODELS = np.array([0, 0, 0, 0, 2, 3], np.uint8)  # by the number of before: those of a reading start anew
-DRIFTING = 2  # class of hypotheses whose gyroscope drifts, which is gone
-
-
-def with_two_heading_models(found: Snapshot) -> Snapshot:
-    """Return a snapshot with the present numbers of the models of a heading's error, and of the classes."""
-    arrays = {**found.arrays}
-    if "heading" in _names(found, "engine.rows"):
-        rows = arrays["engine.rows"] = found.arrays["engine.rows"].copy()
-        rows["heading"]["model"] = HEADING_MODELS[rows["heading"]["model"]]
-    if "heading_class" in _names(found, "engine.pool"):
-        pool = arrays["engine.pool"] = found.arrays["engine.pool"].copy()
-        pool["heading_class"][pool["heading_class"] == DRIFTING] = 0
-    return Snapshot(arrays, found.document)
-
-
-STEPS: Steps = {7: with_two_heading_models}
+STEPS: Steps = {}
 
 
 def migrated(found: Snapshot, version: int, dtypes: DTypes, fresh: Fresh, steps: Steps = STEPS) -> Snapshot:

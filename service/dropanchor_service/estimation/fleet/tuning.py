@@ -24,8 +24,7 @@ class Tuning(NamedTuple):
     mount_known_std: float = 0.02  # rad, of a mounting angle that is told, or of a platform's own heading
     platform_slip_std: float = 0.15  # rad, of a heading without an IMU: slip, and lag of the readings
     platform_slip_tau: float = 1.0  # s
-    aligned_std: float = 0.05  # rad, mounting angle of a tag whose body axis points along the course
-    aligned_log_prior: float = 1.0  # of such a tag: most are mounted straight
+    mount_untold_std: float = 0.05  # rad, above which a mounting angle counts as one that nobody told
     mount_cell: float = 0.3  # rad, between the guesses of a mounting angle that nobody told
     mount_cells: int = 10  # guesses on each side: all around
     mount_straight: float = 0.5  # share of tags that point about ahead

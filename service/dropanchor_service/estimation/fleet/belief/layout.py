@@ -42,7 +42,7 @@ PLATFORM_MODEL: Final = 3  # given by the kind of heading: a platform's own, whi
 EXACT: Final = 0  # no more than the heading model says
 OWN_ERROR: Final = 1  # the heading reference has a slow error of its own, or drifts
 CLASSES: Final = 2
-FAMILIES: Final = 3 * CLASSES  # each of them: a body axis along the course, any, and one quite unlike the best guess
+FAMILIES: Final = 2 * CLASSES  # each of them: mounted about as the best guess, and quite otherwise
 
 SETTINGS: Final = np.dtype(
     [
@@ -235,7 +235,6 @@ POOL_SLOT: Final = np.dtype(
         ("heading_class", np.int32),  # EXACT or OWN_ERROR
         ("nlos", np.int32),  # 1: there is no line of sight now, so ranges are too long
         ("reverse", np.int32),  # 1: the tag moves backwards since it last stood
-        ("aligned", np.int32),  # 1: the body axis is taken to point along the course
         ("free", np.int32),  # in the head of a free list: how many slots it has
         ("log_weight", np.float64),
         ("los_bias", np.float64),  # m, range bias before the line of sight was lost

@@ -21,7 +21,6 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 
 MERGED_MOUNTS = 0.2  # rad, by which two mounting angles differ at most that are merged
 LIGHT = 6.0  # log weight below the best at which one is not split, and its line of sight not doubted
-ALIKE = 2.0  # ratio of two variances that are alike
 
 
 @njit(nogil=True)
@@ -132,23 +131,11 @@ def max_hypotheses(row: Row, t: Tuning) -> int:
 
 
 @njit(nogil=True)
-def _know_mount_alike(a: Hypothesis, b: Hypothesis) -> bool:
-    """Return whether two hypotheses know the mounting angle about as well, if only one took the body as aligned.
-
-    Else the wide one, which keeps other angles possible, would vanish in the narrow one that is heavier by its prior.
-    """
-    least, most = min(a.cov[MOUNT, MOUNT], b.cov[MOUNT, MOUNT]), max(a.cov[MOUNT, MOUNT], b.cov[MOUNT, MOUNT])
-    return bool(a.aligned == b.aligned or most < ALIKE * least)
-
-
-@njit(nogil=True)
 def _are_alike(a: Hypothesis, b: Hypothesis) -> bool:
     """Return whether two hypotheses say the same of heading, line of sight, direction and mounting angle."""
     if a.heading_class != b.heading_class or a.nlos != b.nlos or a.reverse != b.reverse:
         return False
-    if abs(wrap(b.mean[MOUNT] - a.mean[MOUNT])) > MERGED_MOUNTS:
-        return False
-    return _know_mount_alike(a, b)
+    return bool(abs(wrap(b.mean[MOUNT] - a.mean[MOUNT])) <= MERGED_MOUNTS)
 
 
 @njit(nogil=True)

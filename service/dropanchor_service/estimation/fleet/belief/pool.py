@@ -93,7 +93,6 @@ def load(row: Row, pool: Pool, work: Hypotheses) -> None:
         work[h].heading_class = stored.heading_class
         work[h].nlos = stored.nlos
         work[h].reverse = stored.reverse
-        work[h].aligned = stored.aligned
         work[h].los_bias = stored.los_bias
         work[h].los_bias_var = stored.los_bias_var
         k = 0
@@ -116,7 +115,6 @@ def store(row: Row, pool: Pool, work: Hypotheses, count: int, lane: int) -> None
         stored.heading_class = work[h].heading_class
         stored.nlos = work[h].nlos
         stored.reverse = work[h].reverse
-        stored.aligned = work[h].aligned
         stored.los_bias = work[h].los_bias
         stored.los_bias_var = work[h].los_bias_var
         k = 0

@@ -78,8 +78,8 @@ def slip_std_of(row: Row) -> float:
 
 @njit(nogil=True)
 def is_mount_untold(row: Row, t: Tuning) -> bool:
-    """Return whether the mounting angle is no better known than that of a body axis along the course."""
-    return bool(row.settings.mount_angle_std > t.aligned_std)
+    """Return whether the mounting angle is one that nobody told."""
+    return bool(row.settings.mount_angle_std > t.mount_untold_std)
 
 
 @njit(nogil=True)

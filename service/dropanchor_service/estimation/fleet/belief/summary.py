@@ -194,7 +194,7 @@ def spread_over_all(work: Hypotheses, count: int, scratch: Scratch) -> None:
 @njit(nogil=True)
 def _family(one: Hypothesis, head: Hypothesis) -> int:
     """Return the number of the heading class and the guess of the mounting angle that a hypothesis belongs to."""
-    return int(one.heading_class + CLASSES * (2 if is_mounted_otherwise(one, head) else one.aligned))
+    return int(one.heading_class + CLASSES * is_mounted_otherwise(one, head))
 
 
 @njit(nogil=True)

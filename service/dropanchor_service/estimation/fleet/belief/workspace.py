@@ -16,7 +16,6 @@ WORKING_HYPOTHESIS: Final = np.dtype(
         ("heading_class", np.int32),
         ("nlos", np.int32),
         ("reverse", np.int32),
-        ("aligned", np.int32),
         ("los_bias", np.float64),
         ("los_bias_var", np.float64),
         ("mean", np.float64, (N,)),

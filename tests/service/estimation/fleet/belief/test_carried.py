@@ -40,7 +40,7 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.belief import STATE, hypothesis_of, node_of
 
 SEEDS = range(5910, 5918)
-POCKETS = [5102, 5104, 5109, 5113]  # of which the device swings far when its steps are recognised
+POCKETS = [5104, 5109, 5113]  # of which the device swings far when its steps are recognised
 FIRST_STEPS = [5110, 5113, 5116, 5126, 5127, 5131, 5135, 5143, 5159, 5167, 5174, 5274]
 T = Tuning()
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dropanchor_service.estimation.fleet.belief.layout import MOUNT, PHI, N, R
+from dropanchor_service.estimation.fleet.belief.layout import PHI, N, R
 from dropanchor_service.estimation.fleet.belief.mixture import merge, normalise
 from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
 
@@ -39,16 +39,3 @@ def test_what_is_merged_keeps_weight_mean_and_variance_of_the_two() -> None:
     assert np.isclose(work["log_weight"][0], 0.0)
     assert np.isclose(work["mean"][0, R], 10.0 + share * 0.7 * STD)
     assert np.isclose(work["cov"][0, R, R], STD**2 + share * (1.0 - share) * (0.7 * STD) ** 2)
-
-
-def guesses(mount_std: tuple[float, float]) -> Any:
-    """Return two hypotheses in one place, of which the first took the body axis to point along the course."""
-    work = pair(apart=0.0, log_weight=-3.0)
-    work["aligned"][0] = 1
-    work["cov"][:2, MOUNT, MOUNT] = np.square(mount_std)
-    return work
-
-
-def test_a_guess_of_the_mounting_angle_absorbs_a_wider_one_only_when_both_know_it_alike() -> None:
-    assert merge(guesses((0.05, 0.5)), 2, 0.5, 0.5) == 2
-    assert merge(guesses((0.05, 0.06)), 2, 0.5, 0.5) == 1

@@ -117,7 +117,7 @@ def _is_too_fast(one: Hypothesis, t: Tuning) -> bool:
 def _become_carried(one: Hypothesis, row: Row, node: Node, t: Tuning) -> None:
     """Replace what a vehicle's hypothesis says of speed, slip and accelerometer."""
     s, P = one.mean, one.cov
-    one.reverse = one.aligned = 0
+    one.reverse = 0
     for i in (V, SLIP, GAIT_OFFSET, STEP_SCALE, GYRO_BIAS):
         s[i] = 0.0
     clear_state(P, V, t.walk_speed_std**2)

@@ -26,7 +26,7 @@ TURNABOUT_DEPTH: Final = 8.0  # log weight below the best at which a hypothesis 
 
 
 @njit(nogil=True)
-def is_either_way(row: Row, t: Tuning) -> bool:
+def _is_either_way(row: Row, t: Tuning) -> bool:
     """Return whether a tag has not driven yet since a start with mounting angles all around.
 
     There, one that drives off backwards is the one that is mounted the other way round.
@@ -57,14 +57,13 @@ def _turn(work: Hypotheses, source: int, target: int, log_prior: float) -> None:
 @njit(nogil=True)
 def turn_back(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> int:
     """Let tags that slowed down, or drive off after a stop, turn back. Return the count."""
-    if not can_turn(node) or node.rest == RESTING:
+    if not can_turn(node) or node.rest == RESTING or _is_either_way(row, t):
         return count
     row.since_turnabout_s += node.dt_s
-    either_way = is_either_way(row, t)
     if is_on(SLOW_AHEAD, t) and row.since_turnabout_s >= SLOW_EVERY:
         for h in range(count):
             slow = work[h].reverse == 1 and work[h].mean[V] > -SLOW / 2
-            if slow and (work[h].aligned == 1 or not either_way) and gets_child(work, h, count, 0.0, math.inf):
+            if slow and gets_child(work, h, count, 0.0, math.inf):
                 _turn(work, h, count, EVEN)
                 work[h].log_weight += EVEN
                 row.since_turnabout_s = 0.0
@@ -72,7 +71,7 @@ def turn_back(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> 
     if is_on(TURN_AFTER_STOP, t) and row.stood_s >= STOOD_S:
         top, log_prior = work[best_of(work, count)].log_weight, 0.0 if may_reverse(row, t) else t.reverse_log_prior
         for h in range(count):
-            if (work[h].aligned == 1 or not either_way) and gets_child(work, h, count, top, TURNABOUT_DEPTH):
+            if gets_child(work, h, count, top, TURNABOUT_DEPTH):
                 _turn(work, h, count, log_prior)
                 count += 1
     return count
@@ -84,14 +83,13 @@ def push_back(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> 
 
     Ask before the speed is truncated to the direction of the hypothesis. Return the count.
     """
-    if not is_on(PUSHED_BACK, t) or not can_turn(node):
+    if not is_on(PUSHED_BACK, t) or not can_turn(node) or _is_either_way(row, t):
         return count
-    either_way = is_either_way(row, t)
     for h in range(count):
         one = work[h]
         ahead = one.mean[V] if one.reverse == 0 else -one.mean[V]
         pushed = ahead + t.reverse_slack < -REFUSED * math.sqrt(one.cov[V, V])
-        if pushed and (one.aligned == 1 or not either_way) and gets_child(work, h, count, 0.0, math.inf):
+        if pushed and gets_child(work, h, count, 0.0, math.inf):
             _turn(work, h, count, t.reverse_log_prior)
             count += 1
     return count

@@ -84,7 +84,7 @@ def _initialise(work: Hypotheses, h: int, row: Row, node: Node, yaw: float, yaw_
     P[RANGE_BIAS, RANGE_BIAS] = settings.range_bias_std**2
     work[h].log_weight = 0.0
     work[h].heading_class = EXACT
-    work[h].nlos = work[h].reverse = work[h].aligned = 0
+    work[h].nlos = work[h].reverse = 0
 
 
 @njit(nogil=True)

@@ -1,8 +1,9 @@
 """What nobody told of a new tag: its mounting angle, whether its heading reference is wrong, and which of two places.
 
-The mounting angle is straight ahead, or anything: cells cover all of it. A heading reference with a slow error of its
-own explains the same ranges as one without for a long time. An anchor with two antennas measures a start ahead of it,
-or at the mirror image behind it. All of it is guessed, and the ranges decide by the weights of the hypotheses.
+The mounting angle may be anything: cells cover all of it, with most of the weight straight ahead. A heading reference
+with a slow error of its own explains the same ranges as one without for a long time. An anchor with two antennas
+measures a start ahead of it, or at the mirror image behind it. All of it is guessed, and the ranges decide by the
+weights of the hypotheses.
 """
 
 import math
@@ -11,7 +12,6 @@ from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.belief.births.carrying import start_carried
 from dropanchor_service.estimation.fleet.belief.births.first import collect_start
 from dropanchor_service.estimation.fleet.belief.births.numbers import (
-    ALIGNED,
     MIRRORED_START,
     MOUNT_CELLS,
     OWN_ERROR_AGAIN,
@@ -33,7 +33,6 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Row,
 )
 from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis, keep_heaviest, normalise
-from dropanchor_service.estimation.fleet.belief.rigidity import is_mount_untold
 from dropanchor_service.estimation.fleet.belief.start import (
     is_in_site_frame,
     is_mirrored,
@@ -50,11 +49,8 @@ def at_start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: Tuning
     """Make the first hypotheses once there is enough for them. Return their count."""
     count = collect_start(work, row, node, anchors, t)
     if count > 0:
-        aligned, own_error = _may_be_aligned(row, node, t), may_have_own_error(row, node, t)
+        own_error = may_have_own_error(row, node, t)
         for h in range(count):
-            if aligned and count < MAX_HYPOTHESES:
-                _copy_aligned(work, h, count, t)
-                count += 1
             if own_error and count < MAX_HYPOTHESES:
                 _copy_own_error(work, h, count, row, t, not math.isfinite(row.start.heading))
                 count += 1
@@ -64,22 +60,6 @@ def at_start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: Tuning
             count = start_carried(work, count, row, node, t)
         count = _start_at_both(work, count, row, t)
     return count
-
-
-@njit(nogil=True)
-def _may_be_aligned(row: Row, node: Node, t: Tuning) -> bool:
-    """Return whether the body axis of a new tag may point along its course, as it mostly does."""
-    untold = starts_at_place(row) and not is_in_site_frame(node.heading_kind) and is_mount_untold(row, t)
-    return untold and is_on(ALIGNED, t)
-
-
-@njit(nogil=True)
-def _copy_aligned(work: Hypotheses, source: int, target: int, t: Tuning) -> None:
-    """Copy `source` for a body axis along the course."""
-    copy_hypothesis(work, source, target)
-    work[target].cov[MOUNT, MOUNT] = t.aligned_std**2
-    work[target].aligned = 1
-    work[target].log_weight += t.aligned_log_prior
 
 
 @njit(nogil=True)
@@ -100,7 +80,7 @@ def _add_mounts(work: Hypotheses, count: int, row: Row, t: Tuning) -> int:
     for k in range(-cells, cells + 1):
         total += math.exp(-0.5 * (k * t.mount_cell / std) ** 2)
     for h in range(count):
-        if work[h].aligned == 1 or count + 2 * cells > MAX_HYPOTHESES:
+        if count + 2 * cells > MAX_HYPOTHESES:
             continue
         work[h].cov[MOUNT, MOUNT] = (t.mount_cell / 2.0) ** 2
         for k in range(-cells, cells + 1):

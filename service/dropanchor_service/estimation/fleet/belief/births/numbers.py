@@ -2,14 +2,14 @@
 
 from typing import Final
 
-GIVEN_START, RING, ALIGNED, OWN_ERROR, MOUNT_CELLS, CARRIED_START, PICK_UP, SET_DOWN = range(8)
-SLOW_AHEAD, TURN_AFTER_STOP, DEVICE_TURN, WIDENED = range(8, 12)
-SIGHT_EXPECTED, ROTATIONS, PUSHED_BACK = range(12, 15)
-SIGHT_LOST, SIGHT_BACK, SPLIT_CURVED = range(15, 18)
-SPLIT_WIDE, OWN_ERROR_AGAIN, RING_AGAIN = range(18, 21)
-WALKED_OFF, AFTER_GAP, MIRRORED_START, FIX = range(21, 25)
+GIVEN_START, RING, OWN_ERROR, MOUNT_CELLS, CARRIED_START, PICK_UP, SET_DOWN = range(7)
+SLOW_AHEAD, TURN_AFTER_STOP, DEVICE_TURN, WIDENED = range(7, 11)
+SIGHT_EXPECTED, ROTATIONS, PUSHED_BACK = range(11, 14)
+SIGHT_LOST, SIGHT_BACK, SPLIT_CURVED = range(14, 17)
+SPLIT_WIDE, OWN_ERROR_AGAIN, RING_AGAIN = range(17, 20)
+WALKED_OFF, AFTER_GAP, MIRRORED_START, FIX = range(20, 24)
 NAMES: Final = (
-    *("given-start", "ring", "aligned-body", "own-error", "mount-cells", "carried-start", "pick-up", "set-down"),
+    *("given-start", "ring", "own-error", "mount-cells", "carried-start", "pick-up", "set-down"),
     *("ahead-while-slow", "turned-after-stop", "turned-device", "widened"),
     *("sight-expected", "rotations", "pushed-back"),
     *("sight-lost", "sight-back", "split-curved"),

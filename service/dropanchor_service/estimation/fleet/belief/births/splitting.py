@@ -65,15 +65,6 @@ def curvature(one: Hypothesis, variance: float) -> float:
 
 
 @njit(nogil=True)
-def are_aligned_alike(work: Hypotheses, count: int) -> bool:
-    """Return whether all hypotheses, or none, take the body axis to point along the course."""
-    aligned = 0
-    for h in range(count):
-        aligned += work[h].aligned
-    return bool(aligned == 0 or aligned == count)
-
-
-@njit(nogil=True)
 def are_mounted_alike(work: Hypotheses, count: int) -> bool:
     """Return whether no hypothesis takes the body to be mounted quite differently from the best one."""
     best, others = work[best_of(work, count)], 0
@@ -86,7 +77,7 @@ def are_mounted_alike(work: Hypotheses, count: int) -> bool:
 def may_split_curved(work: Hypotheses, count: int, row: Row) -> bool:
     """Return whether a vehicle's hypotheses are split by their curvature: not while they must cover a wide guess."""
     vehicle = row.publication.resolved == 1 and row.walk.carried == 0 and row.start.coarse == 0
-    return bool(vehicle and are_aligned_alike(work, count) and are_mounted_alike(work, count))
+    return bool(vehicle and are_mounted_alike(work, count))
 
 
 @njit(nogil=True)
