@@ -10,6 +10,7 @@ from dropanchor_schemas.keys import checked_id
 from dropanchor_schemas.models import Exact
 from dropanchor_schemas.remote import MAX_BATCH_S, MAX_IMU_HZ, MIN_BATCH_S, MIN_IMU_HZ
 from dropanchor_schemas.sentences import say
+from dropanchor_schemas.time_zones import TimeZone
 from dropanchor_schemas.wire import anchor_number
 
 
@@ -114,10 +115,6 @@ class StartPose(Exact):
     std_m: Positive = Field(default=0.1, description="Standard deviation of x and of y.")
 
 
-_COLOURS = ["#2f7fd0", "#d97a0a", "#1b8a6b", "#b89b00", "#c7609a", "#cf4a12", "#7a8793"]
-"""Colours that differ for people with any colour vision, and that show on light and on dark."""
-
-
 class TagSettings(Exact):
     """What an operator knows about a tag. A measured range is range_scale · distance + range_bias_m."""
 
@@ -125,7 +122,7 @@ class TagSettings(Exact):
     colour: Annotated[str, Field(pattern=r"^#[0-9a-f]{6}$")] | None = Field(
         default=None,
         description="Colour that marks the tag on the map, such as #0b62b8; null: none.",
-        examples=_COLOURS,
+        examples=["#2f7fd0", "#d97a0a", "#1b8a6b", "#b89b00", "#c7609a", "#cf4a12", "#7a8793"],
     )
     group: Label = Field(default="", description="Group that lists and streams can select; empty: none.")
     height_m: Number = Field(
@@ -280,6 +277,7 @@ class Site(Exact):
         "it were exact. It widens the ellipses of tags whose start was not told.",
     )
     georeference: Georeference | None = None
+    time_zone: TimeZone | None = None
     anchors: list[Anchor] = Field(default=[], description="The anchors of the site.")
 
     @model_validator(mode="after")

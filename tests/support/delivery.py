@@ -46,7 +46,9 @@ class DeliveryBench:
         self.store = EventStore(database, "yard", lambda draft: addressees(self.destinations, draft))
         self.deliveries = Deliveries(database)
         settings = DeliverySettings.model_validate({"allow_networks": LOOPBACK, "timeout_s": 60.0} | delivery)
-        self.channels = Channels(settings, email or EmailSettings(), mqtt or MqttSettings(), name_of)
+        self.channels = Channels(
+            settings, email or EmailSettings(), mqtt or MqttSettings(), name_of, zone_of=self._zone
+        )
         patience = Patience(
             retry_s=0.2, give_up_ns=round(give_up_s * 1e9), second_chance_ns=round(second_chance_s * 1e9)
         )
@@ -55,6 +57,9 @@ class DeliveryBench:
         live = LiveSite(self.live.answers, self.zones, self.store)
         outbox = self.outbox = Outbox(self.destinations, self.store, self.deliveries, self.channels, live)
         self.thread = DeliveryThread([outbox], patience, time.time_ns)
+
+    def _zone(self) -> str | None:
+        return self.live.answers.site.site.time_zone
 
     def put(self, destination: Destination) -> None:
         self.destinations.put(destination.id, destination)

@@ -19,7 +19,7 @@ from dropanchor_schemas.sentences import said_by, say, with_stop
 from dropanchor_service.delivery.addresses import RefusedAddressError, UrlError, allowed, checked_url, resolved
 from dropanchor_service.delivery.channel import Channel, ChannelError, tls_context
 from dropanchor_service.delivery.receiver_networks import ReceiverNetworks
-from dropanchor_service.delivery.sentences import NameOf
+from dropanchor_service.delivery.sentences import NameOf, ZoneOf
 from dropanchor_service.delivery.signature import SecretError, key_of
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
 
@@ -75,6 +75,7 @@ class Channels:
         name_of: NameOf = str,
         shared: SharedWays | None = None,
         networks: ReceiverNetworks | None = None,
+        zone_of: ZoneOf = lambda: None,
     ) -> None:
         """name_of: by default, the id of the tag. shared: by all sites. networks: by default, those of the settings.
 
@@ -85,6 +86,7 @@ class Channels:
         self._email = email
         self._mqtt = mqtt
         self._name_of = name_of
+        self._zone_of = zone_of
         self._shared = shared or SharedWays(delivery.authorities)
 
     def open(self, destination: Destination) -> AbstractAsyncContextManager[Channel]:
@@ -99,7 +101,8 @@ class Channels:
                 from dropanchor_service.delivery.mail import open_mail
 
                 page, tls = self._delivery.page, self._shared.email
-                return open_mail(destination, self._email, tls, timeout_s, self.networks, page, self._name_of)
+                of_site = self.networks, page, self._name_of, self._zone_of
+                return open_mail(destination, self._email, tls, timeout_s, *of_site)
             case MqttDestination() | MqttPosesDestination():
                 from dropanchor_service.delivery.mqtt.events import open_mqtt  # an extra
 

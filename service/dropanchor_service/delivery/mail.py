@@ -7,9 +7,10 @@ import ssl
 from collections import Counter
 from collections.abc import AsyncIterator, Iterable, Sequence
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from email.message import EmailMessage
 from email.utils import formatdate
+from zoneinfo import ZoneInfo
 
 import aiosmtplib
 
@@ -18,7 +19,7 @@ from dropanchor_schemas.events import Event
 from dropanchor_service.delivery.addresses import RefusedAddressError, connected
 from dropanchor_service.delivery.channel import ChannelError, Outcome, Portion, Verdict, password_in
 from dropanchor_service.delivery.public_addresses import Network
-from dropanchor_service.delivery.sentences import NameOf, kind, link, place_and_time, sentence, site_of
+from dropanchor_service.delivery.sentences import NameOf, ZoneOf, kind, link, place_and_time, sentence, site_of
 from dropanchor_service.delivery.words import Words, words_in
 from dropanchor_service.settings.events import EmailSettings
 
@@ -40,13 +41,15 @@ class MailChannel:
     allow_networks: Iterable[Network]
     page: str | None
     name_of: NameOf
+    zone_of: ZoneOf
 
     @property
     def portion(self) -> Portion:
         return Portion(MAX_EVENTS, is_mixed=True, pause_s=self.destination.digest_s)
 
     async def send(self, events: Sequence[bytes]) -> Sequence[Outcome]:
-        words = words_in(self.destination.language)
+        zone = self.zone_of()
+        words = replace(words_in(self.destination.language), zone=ZoneInfo(zone) if zone else None)
         mail = mail_of(events, self.settings.sender, self.destination.to, self.page, self.name_of, words)
         outcome = await self._send(mail)
         return [outcome] * len(events)
@@ -95,9 +98,10 @@ async def open_mail(
     allow_networks: Iterable[Network],
     page: str | None,
     name_of: NameOf,
+    zone_of: ZoneOf,
 ) -> AsyncIterator[MailChannel]:
     """Open the way to people. Every mail makes a connection of its own, since mails are rare."""
-    yield MailChannel(destination, settings, tls, timeout_s, allow_networks, page, name_of)
+    yield MailChannel(destination, settings, tls, timeout_s, allow_networks, page, name_of, zone_of)
 
 
 async def _end(sock: socket.socket) -> None:

@@ -1,7 +1,6 @@
 """Events as sentences for people."""
 
 from collections.abc import Callable
-from datetime import UTC, datetime
 from urllib.parse import urlencode
 
 from dropanchor_schemas.events import Event, EventData
@@ -11,6 +10,8 @@ from dropanchor_service.events.store import rfc3339
 SOURCE_PREFIX = "urn:dropanchor:site:"
 NameOf = Callable[[str], str]
 """Returns how people call a tag."""
+ZoneOf = Callable[[], str | None]
+"""Returns the time zone of a site."""
 
 _AROUND_NS = 300_000_000_000  # of the past that a link shows, before and after the event
 
@@ -47,7 +48,7 @@ def place_and_time(event: Event, words: Words) -> str:
     where = [] if data.x is None else [f"x {place[0]}, y {place[1]}"]
     floor = None if data.probability is None else int(data.probability * 100) / 100
     sure = [] if floor is None else [f"{words.texts['mail.probability']} {words.number(floor, 2)}"]
-    return "; ".join([words.time(datetime.fromtimestamp(data.t_ns / 1e9, UTC).astimezone()), *where, *sure])
+    return "; ".join([words.time(data.t_ns), *where, *sure])
 
 
 def site_of(event: Event) -> str:

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime, tzinfo
 from functools import cache
 from importlib.resources import files
 
@@ -17,17 +17,18 @@ _MARKS_AND_TIMES = {
 
 @dataclass(frozen=True)
 class Words:
-    """How a mail says things in one language. texts: as in `dashboard/i18n/en/events.js`."""
+    """How a mail says things. texts: as in `dashboard/i18n/en/events.js`. zone: of its times; None: of the host."""
 
     texts: Mapping[str, str]
     marks: str
     times: str
+    zone: tzinfo | None = None
 
     def number(self, value: float, decimals: int) -> str:
         return f"{value:,.{decimals}f}".translate(str.maketrans(",.", self.marks))
 
-    def time(self, when: datetime) -> str:
-        return when.strftime(self.times)
+    def time(self, t_ns: int) -> str:
+        return datetime.fromtimestamp(t_ns / 1e9, UTC).astimezone(self.zone).strftime(self.times)
 
 
 @cache

@@ -104,7 +104,8 @@ class ZoneEvents:
         except (OSError, ValueError, sqlite3.Error) as error:
             raise SettingsError(f"data_dir: zones or events in {folder} cannot be read: {error}") from error
         delivery = _with_page_of(settings.delivery, site.id) if several else settings.delivery
-        channels = Channels(delivery, settings.email, settings.mqtt, partial(_name_of, site.store), shared, networks)
+        of_site = partial(_name_of, site.store), shared, networks, lambda: site.store.site.time_zone
+        channels = Channels(delivery, settings.email, settings.mqtt, *of_site)
         live = LiveSite(Answers(site.store, site.tags, latest, self._now_ns), items.zones, store)
         return _Opened(items, Outbox(destinations, store, Deliveries(database), channels, live), watched)
 

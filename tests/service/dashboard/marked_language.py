@@ -35,7 +35,7 @@ TEXTS = """() => {
     return [...texts, ...window.written];
 }"""
 SYMBOLS = re.compile(
-    r"(?<![A-Za-z])(m/s2?|rad/s|deg/s|cm|mm|km|mg|g|mi|mph|ft|m|s|min|h|d|MB|ms|dBm|°C|V|σ|CSV|JSON|GeoJSON|GPX|KML|Parquet|USB|Bluetooth)(?![A-Za-z])"
+    r"(?<![A-Za-z])(m/s2?|rad/s|deg/s|cm|mm|km|mg|g|mi|mph|ft|m|s|min|h|d|MB|ms|dBm|°C|V|σ|CSV|JSON|GeoJSON|GPX|UTC|KML|Parquet|USB|Bluetooth)(?![A-Za-z])"
 )
 
 

@@ -2,6 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { HOUR_MS, QUICK, dayOf, gapAt, lastHour, quickPeriod, stripPath } from "../../../service/dropanchor_service/dashboard/data/periods.js";
+import { setTimeZone, timeOf, wallTime } from "../../../service/dropanchor_service/dashboard/data/time_zone.js";
 
 const NOW = new Date(2026, 0, 31, 10, 30).getTime();
 const at = (/** @type {number[]} */ ...parts) => new Date(...(/** @type {[number, number]} */ (/** @type {unknown} */ (parts)))).getTime();
@@ -20,6 +21,16 @@ test("a day is whole unless it is today, and one to come has no poses", () => {
   assert.deepEqual(dayOf("2026-01-31", NOW), { from_ms: at(2026, 0, 31), to_ms: NOW });
   assert.equal(dayOf("2026-02-01", NOW), null);
   assert.equal(dayOf("", NOW), null);
+});
+
+test("days are those of the site's time zone, also when its clocks change", () => {
+  setTimeZone("Asia/Kolkata");
+  assert.equal(quickPeriod("today", Date.UTC(2026, 0, 31, 19)).from_ms, Date.UTC(2026, 0, 31, 18, 30));
+  setTimeZone("Europe/Berlin");
+  const { from_ms, to_ms } = /** @type {any} */ (dayOf("2026-03-29", Date.UTC(2026, 5)));
+  assert.deepEqual([from_ms, (to_ms - from_ms) / HOUR_MS], [Date.UTC(2026, 2, 28, 23), 23]);
+  assert.equal(wallTime(timeOf("2026-07-01T14:03:05")), "2026-07-01T14:03:05");
+  setTimeZone(null);
 });
 
 test("the last hour begins with its first pose", () => {

@@ -5,6 +5,7 @@ import re
 import time
 from datetime import datetime, timedelta
 from pathlib import Path
+from zoneinfo import ZoneInfo
 
 import pyarrow.parquet as pq
 import pytest
@@ -19,6 +20,8 @@ from support.browser import every_look, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
+
+TOKYO = ZoneInfo("Asia/Tokyo")
 
 
 def test_a_link_leads_to_a_moment_of_the_past_and_back_to_the_present(
@@ -161,12 +164,19 @@ def test_a_period_is_chosen_and_a_wrong_or_an_empty_one_is_explained(
     place, end_ns = past
     with watched_page(chromium, place.url) as page:
         page.wait_for_map(2)  # "turned" was lost an hour ago, nobody knows where
+        page.page.locator("#options").click()
+        expect(page.page.locator("#zone-said")).to_contain_text("the time zone of this browser")
+        page.page.get_by_label("Time zone of the site").select_option("Asia/Tokyo")
+        expect(page.page.locator("#zone-said")).to_have_text("Times are in Asia/Tokyo, the time zone of the site.")
+        assert place.bench.answers.site.site.time_zone == "Asia/Tokyo"
+        page.page.keyboard.press("Escape")
         page.page.locator("#history").click()
         wait_for_past(page, 3)
         assert page.tags()["first"]["x"] == pytest.approx(
             0, abs=0.1
         )  # the past begins with its first pose, not an hour before the last one
-        begin = datetime.fromtimestamp(end_ns / SECOND - 60 * MINUTES)
+        expect(page.page.locator(".past [data-part='time']")).to_contain_text("GMT+9")
+        begin = datetime.fromtimestamp(end_ns / SECOND - 60 * MINUTES, TOKYO).replace(tzinfo=None)
         shown = datetime.fromisoformat(page.page.locator("[data-part='from']").input_value())
         assert 0 <= (begin - shown).total_seconds() <= 20
         page.page.locator("[data-part='to']").fill("2020-01-02T00:00:00")
@@ -176,7 +186,8 @@ def test_a_period_is_chosen_and_a_wrong_or_an_empty_one_is_explained(
         problem = page.page.locator(".past [data-part='problem']")
         expect(problem).to_have_text(re.compile("No poses are stored in this period. All poses are from .* to "))
         local = [
-            datetime.fromtimestamp(t / SECOND).strftime("%Y-%m-%dT%H:%M:%S") for t in (end_ns - 60 * SECOND, end_ns)
+            datetime.fromtimestamp(t / SECOND, TOKYO).strftime("%Y-%m-%dT%H:%M:%S")
+            for t in (end_ns - 60 * SECOND, end_ns)
         ]
         page.page.locator("[data-part='from']").fill(local[1])
         page.page.locator("[data-part='to']").fill(local[0])

@@ -1,6 +1,7 @@
 """Events reach a real mail server: as plain sentences, many in one mail, through outages and refusals."""
 
 import gc
+import re
 import ssl
 import time
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ from aiosmtpd.smtp import SMTP, Envelope, Session
 from pydantic import ValidationError
 
 from dropanchor_schemas.destinations import EmailDestination, Language
+from dropanchor_schemas.site import Site
 from dropanchor_service.delivery import queue
 from dropanchor_service.settings.events import EmailSettings
 from service.delivery.names import resolve_to_loopback
@@ -57,6 +59,7 @@ def server_context(folder: Path) -> tuple[ssl.SSLContext, Path]:
 def test_a_mail_says_who_did_what_where_and_when_and_links_to_the_moment() -> None:
     server = MailServer()
     bench = bench_of(server, page="https://yard.example.com/", name_of=lambda tag: f"Cart ({tag})")
+    bench.live.answers.site.set_site(Site(id="yard", time_zone="Asia/Kolkata"))
     with running_mail_server(server), delivering(bench):
         bench.happen("cart-3")
         wait_until(lambda: bench.counts() == (0, 0))
@@ -66,6 +69,7 @@ def test_a_mail_says_who_did_what_where_and_when_and_links_to_the_moment() -> No
     assert mail["Auto-Submitted"] == "auto-generated"
     said, where, link = mail.get_content().splitlines()[:3]
     assert said == "Cart (cart-3) entered Loading dock."
+    assert re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d IST; ", where)
     assert where.endswith("x 3.2 m, y 1.7 m; probability 0.99; event 1")
     assert link.startswith("https://yard.example.com/#from=20")
     assert link.endswith("&tag=cart-3")

@@ -1,4 +1,6 @@
-/** Periods of the past by name, in the time of the browser. */
+/** Periods of the past by name, in the time zone of the page. */
+
+import { timeOf, wallDate } from "./time_zone.js";
 
 export const HOUR_MS = 3_600_000;
 const MOMENT_MS = 5000;
@@ -20,7 +22,7 @@ export function quickPeriod(choice, now_ms) {
 /** Return a whole day, until now if it is today; null for no date, and for a day that has not begun. @param {string} date such as 2026-01-31
  * @param {number} now_ms @returns {Period | null} */
 export function dayOf(date, now_ms) {
-  const from_ms = new Date(`${date}T00:00`).getTime();
+  const from_ms = timeOf(`${date}T00:00`);
   return from_ms < now_ms ? { from_ms, to_ms: Math.min(now_ms, midnight(from_ms, 1)) } : null;
 }
 
@@ -59,7 +61,4 @@ export function stripPath(stretches, { from_ms, to_ms }) {
 }
 
 /** Return the start of a day. @param {number} time_ms on some day @param {number} days after it */
-function midnight(time_ms, days) {
-  const time = new Date(time_ms);
-  return new Date(time.getFullYear(), time.getMonth(), time.getDate() + days).getTime();
-}
+const midnight = (time_ms, days) => timeOf(`${wallDate(time_ms, days)}T00:00`);

@@ -1,6 +1,7 @@
 /** The language of the page: its messages, numbers and times. A page in another language is loaded anew. */
 
 import { chosen } from "../data/display.js";
+import { timeZone } from "../data/time_zone.js";
 
 /** @typedef {string | {one: string, other: string}} Message `{name}` stands for a value; `one` is for n = 1 */
 /** @typedef {Record<string, string | number | undefined>} Values */
@@ -55,7 +56,7 @@ export function decimal(value, least, most = least) {
 }
 
 /** Format a time. The clock has 24 hours. @param {number | Date} time @param {Intl.DateTimeFormatOptions} options */
-export const timeText = (time, options) => new Intl.DateTimeFormat(locale, { ...options, hourCycle: "h23" }).format(time);
+export const timeText = (time, options) => new Intl.DateTimeFormat(locale, { timeZone: timeZone(), ...options, hourCycle: "h23" }).format(time);
 
 /** @param {string} tag such as de-AT */
 function baseOf(tag) {

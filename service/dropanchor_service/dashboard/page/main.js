@@ -46,6 +46,7 @@ import { installTheme } from "./theme.js";
 import { Trails } from "../data/trails.js";
 import { ViewAddress } from "./view_address.js";
 import { Zones } from "../zones/zones.js";
+import { installZoneChoice } from "./zone_choice.js";
 import { byId } from "./parts.js";
 
 const PANELS_MS = 250;
@@ -264,6 +265,7 @@ setInterval(updatePanels, PANELS_MS);
 connection.start();
 roster.start();
 new Impaired(byId("impaired")).start();
+installZoneChoice(connection, setup.changes);
 connection.addEventListener("snapshot", () => past.start(), { once: true });
 
 /** Read-only access for tests and for the console. */

@@ -1,6 +1,7 @@
 /** The controls of the past: which period, when in it, how fast, and a clear note that this is not the present. */
 
 import { HOUR_MS, LONGEST_MS, QUICK, dayOf, gapAt, quickPeriod, stripPath } from "../data/periods.js";
+import { timeOf, wallDate, wallTime } from "../data/time_zone.js";
 import { SPEEDS } from "../data/replay.js";
 import { decimal, t, timeText } from "../i18n/language.js";
 import { partOf, write } from "../page/parts.js";
@@ -83,7 +84,7 @@ export class PastBar extends EventTarget {
   #gap() {
     const gap = this.times.stretches && gapAt(this.times.stretches, this.replay, this.replay.time_ms);
     if (!gap || gap.to_ms - gap.from_ms < GAP_MS) return "";
-    const isOneDay = new Date(gap.from_ms).toDateString() === new Date(gap.to_ms).toDateString();
+    const isOneDay = wallDate(gap.from_ms) === wallDate(gap.to_ms);
     const short = (/** @type {number} */ time_ms) => timeText(time_ms, { weekday: isOneDay ? undefined : "short", hour: "2-digit", minute: "2-digit" });
     return t("past.gap", { from: short(gap.from_ms), to: short(gap.to_ms) });
   }
@@ -111,7 +112,7 @@ export class PastBar extends EventTarget {
   /** @param {Event} event */
   #choose(event) {
     event.preventDefault();
-    const [from_ms, to_ms] = ["from", "to"].map((name) => new Date(this.#input(name).value).getTime());
+    const [from_ms, to_ms] = ["from", "to"].map((name) => timeOf(this.#input(name).value));
     const isRight = to_ms > from_ms && to_ms - from_ms <= LONGEST_MS;
     if (isRight) this.#open({ from_ms, to_ms });
     else this.#refuse(t("past.order"));
@@ -143,8 +144,7 @@ export class PastBar extends EventTarget {
 
   /** @param {string} name @param {number} time_ms */
   #write(name, time_ms) {
-    const local = new Date(time_ms - new Date(time_ms).getTimezoneOffset() * 60_000);
-    this.#input(name).value = local.toISOString().slice(0, 19);
+    this.#input(name).value = wallTime(time_ms);
   }
 
   /** @param {string} name */

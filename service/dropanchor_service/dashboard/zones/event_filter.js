@@ -1,5 +1,6 @@
 /** The form over the list of events: which ones, and what to do with them. */
 
+import { timeOf } from "../data/time_zone.js";
 import { t } from "../i18n/language.js";
 import { fieldOf, partOf } from "../page/parts.js";
 import { saveEvents } from "./found_events.js";
@@ -33,7 +34,7 @@ export class EventFilter extends EventTarget {
   /** @returns {Wanted} */
   get wanted() {
     const text = (/** @type {string} */ name) => fieldOf(this.form, name).value;
-    const time = (/** @type {string} */ name) => (text(name) === "" ? null : new Date(text(name)).getTime());
+    const time = (/** @type {string} */ name) => (text(name) === "" ? null : timeOf(text(name)));
     return { tag: this.#tagCalled(text("tag").trim()), type: text("type"), zone: text("zone"), from_ms: this.period?.from_ms ?? time("from"), to_ms: this.period?.to_ms ?? time("to") };
   }
 

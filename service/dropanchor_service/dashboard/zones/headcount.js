@@ -33,7 +33,7 @@ export class Headcount {
 
   async #update() {
     const answer = await getJson(api("zone-occupancy?names=true")).catch(() => null);
-    write(partOf(this.dialog, "when"), answer ? timeText(Date.now(), { dateStyle: "full", timeStyle: "medium" }) : t("zones.outdated"));
+    write(partOf(this.dialog, "when"), answer ? timeText(Date.now(), { dateStyle: "full", timeStyle: "long" }) : t("zones.outdated"));
     const groups = /** @type {Group[] | null} */ (answer && this.#groups(answer.zones));
     const shown = JSON.stringify(groups);
     if (groups && shown !== this.#shown) partOf(this.dialog, "groups").replaceChildren(...groups.map((group) => this.#section(group)));

@@ -1,5 +1,6 @@
 /** Events and changes of zones in words, and times for people. */
 
+import { wallDate } from "../data/time_zone.js";
 import { age, fixed, length, percent, speed } from "../data/format.js";
 import { has, keysAfter, t, timeText } from "../i18n/language.js";
 
@@ -52,10 +53,10 @@ export function probability({ data }) {
   return t("event.probability", { probability: fixed(data.probability < 1 ? Math.floor(data.probability * 100) / 100 : 1, 2) });
 }
 
-/** Return the local time of an event, with the date unless it is today. @param {{time: string | number}} event @param {Date} [now] */
+/** Return the time of an event, with the date unless it is today. @param {{time: string | number}} event @param {Date} [now] */
 export function clock({ time }, now = new Date()) {
   const at = new Date(time);
-  const isToday = at.toDateString() === now.toDateString();
+  const isToday = wallDate(at.getTime()) === wallDate(now.getTime());
   return timeText(at, { ...(isToday ? {} : { dateStyle: "medium" }), timeStyle: "medium" });
 }
 

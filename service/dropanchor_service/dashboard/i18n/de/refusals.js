@@ -29,6 +29,7 @@ export default {
   "say.key_by_command": "Dieser Dienst darf seine Schlüssel nicht ändern. Erstellen und widerrufen Sie sie mit `dropanchor key`, wo seine Zugangsdaten angelegt wurden.",
   "say.key_taken": "Es gibt schon einen Schlüssel namens {name}: Wählen Sie einen anderen Namen.",
   "say.no_such_key": "Diesen Schlüssel gibt es nicht. GET /api/v1/keys listet sie auf.",
+  "say.time_zone_unknown": "der Dienst kennt keine Zeitzone {name}: Geben Sie eine an wie Europe/Berlin",
   "say.key_use": "geben Sie einen Umfang oder ein Tag an",
   "say.share_both": "Geben Sie ein Tag oder eine Gruppe an, nicht beides",
   "say.internal": "Ein unerwarteter Fehler ist aufgetreten. Das Protokoll des Dienstes nennt die Einzelheiten.",
