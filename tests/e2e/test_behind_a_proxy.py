@@ -2,7 +2,6 @@
 
 import json
 import ssl
-import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
@@ -17,7 +16,7 @@ from websockets.sync.client import connect
 from support.browser import running_chromium
 from support.patience import PATIENCE_S
 from support.proxies import caddy, nginx, of_guide
-from support.service import command, environment, running_service
+from support.service import ended, running_service
 from support.zenoh_router import free_port, wait_until
 
 Proxy = Callable[[Path, str], AbstractContextManager[tuple[str, Path]]]
@@ -43,7 +42,8 @@ def proxied(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     security = ["--security", str(tmp_path / "security")]
 
     def made(*words: str) -> str:
-        done = subprocess.run(command(*words, *security), env=environment(), check=True, text=True, capture_output=True)
+        done = ended(*words, *security)
+        assert done.returncode == 0, done.stderr
         return done.stdout.strip()
 
     made("security", "init", "--host", "localhost", "--listen", f"tls/127.0.0.1:{free_port()}")

@@ -14,7 +14,7 @@ import pytest
 
 from support.patience import PATIENCE_S
 from support.recordings import write_square
-from support.service import command, environment
+from support.service import command, ended, environment
 from support.zenoh_router import free_endpoint, wait_until
 
 
@@ -99,9 +99,7 @@ def test_a_missing_recording_is_reported_and_the_data_folder_kept_private(tmp_pa
     tmp_path.chmod(0o755)
     (tmp_path / "site.json").touch(mode=0o644)
     options = ("--recording", "nowhere", "--data-dir", str(tmp_path))
-    found = subprocess.run(
-        command("demo", *options), capture_output=True, text=True, env=environment(), timeout=PATIENCE_S
-    )
+    found = ended("demo", *options)
     assert found.returncode == 2
     assert "nowhere is not a folder" in found.stderr
     assert (tmp_path / "site.json").stat().st_mode & 0o077 == 0

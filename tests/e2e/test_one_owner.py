@@ -2,27 +2,23 @@
 
 import signal
 import socket
-import subprocess
 from pathlib import Path
 
-from support.patience import PATIENCE_S
-from support.service import command, environment, running_service
+from support.commands import Ended
+from support.service import ended, running_service
 from support.zenoh_router import free_endpoint
 
 
-def second(folder: Path) -> subprocess.CompletedProcess[str]:
-    arguments = ("serve", "--port", "0", "--zenoh-listen", free_endpoint(), "--data-dir", str(folder))
-    return subprocess.run(
-        command(*arguments), capture_output=True, text=True, env=environment(), timeout=PATIENCE_S, check=False
-    )
+def second(folder: Path) -> Ended:
+    return ended("serve", "--port", "0", "--zenoh-listen", free_endpoint(), "--data-dir", str(folder))
 
 
 def test_a_second_service_with_the_data_folder_ends_and_says_who_has_it(tmp_path: Path) -> None:
     with running_service("--data-dir", str(tmp_path)) as service:
         service.put("/api/v1/anchors/gate", {"id": "gate", "x": 1.5, "y": 2.0, "z": 0.0})
-        ended = second(tmp_path)
-        assert ended.returncode == 2
-        (line,) = ended.stderr.splitlines()
+        refused = second(tmp_path)
+        assert refused.returncode == 2
+        (line,) = refused.stderr.splitlines()
         owner = f"process {service.process.pid} on {socket.gethostname()} since 20"
         assert line.startswith(f"dropanchor serve: data_dir: {tmp_path} is in use by {owner}")
         assert line.endswith("stop it, or give this process a folder of its own")
@@ -37,7 +33,7 @@ def test_a_service_whose_lock_is_a_link_ends_and_overwrites_nothing(tmp_path: Pa
     target.write_text("root:x")
     folder.mkdir()
     (folder / "owner.lock").symlink_to(target)
-    ended = second(folder)
-    assert ended.returncode == 2
-    assert f"data_dir: {folder}/owner.lock is a link, and would overwrite what it leads to" in ended.stderr
+    refused = second(folder)
+    assert refused.returncode == 2
+    assert f"data_dir: {folder}/owner.lock is a link, and would overwrite what it leads to" in refused.stderr
     assert target.read_text() == "root:x"

@@ -1,6 +1,5 @@
 """A secured site, from the first command to a pose: certificates, access control, API keys, HTTPS."""
 
-import subprocess
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -10,7 +9,7 @@ import pytest
 from dropanchor_service.cli import main
 from dropanchor_tag_client import TagClient, read_credentials
 from support.patience import PATIENCE_S
-from support.service import command, environment, running_router, running_service, straight_north
+from support.service import ended, running_router, running_service, straight_north
 from support.zenoh_router import free_port, wait_until
 
 
@@ -108,8 +107,7 @@ def test_a_service_with_its_own_router_admits_only_tags_with_valid_credentials(s
 
 def test_an_invalid_certificate_is_reported_in_one_sentence(site: Site) -> None:
     (site.path / "service.key").write_text("no key")
-    words = command("serve", "--port", "0", "--security", str(site.path), "--zenoh-connect", site.endpoint)
-    result = subprocess.run(words, capture_output=True, text=True, env=environment(), timeout=PATIENCE_S, check=False)
+    result = ended("serve", "--port", "0", "--security", str(site.path), "--zenoh-connect", site.endpoint)
     assert result.returncode == 2
     assert "cannot serve HTTPS" in result.stderr
     assert "Traceback" not in result.stderr

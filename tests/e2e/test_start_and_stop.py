@@ -9,7 +9,7 @@ import httpx
 import pytest
 
 from support.patience import PATIENCE_S
-from support.service import command, environment, running_service
+from support.service import command, ended, environment, running_service
 from support.zenoh_router import (
     free_endpoint,
     running_router,
@@ -17,21 +17,10 @@ from support.zenoh_router import (
 )
 
 
-def run(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        command(*arguments),
-        capture_output=True,
-        text=True,
-        env=environment(**variables),
-        timeout=PATIENCE_S,
-        check=False,
-    )
-
-
 def test_a_taken_http_port_is_reported_in_one_sentence() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        result = run("serve", "--port", str(port), "--zenoh-listen", free_endpoint())
+        result = ended("serve", "--port", str(port), "--zenoh-listen", free_endpoint())
     assert result.returncode == 2
     assert len(result.stderr.splitlines()) == 1
     assert f"port {port}: another program uses it" in result.stderr
@@ -41,7 +30,7 @@ def test_a_taken_http_port_is_reported_in_one_sentence() -> None:
 def test_a_taken_zenoh_port_is_reported_in_one_sentence(subcommand: str) -> None:
     endpoint = free_endpoint()
     with running_router(endpoint):
-        result = run(subcommand, *(("--port", "0") if subcommand == "serve" else ()), "--zenoh-listen", endpoint)
+        result = ended(subcommand, *(("--port", "0") if subcommand == "serve" else ()), "--zenoh-listen", endpoint)
     assert result.returncode == 2
     assert [line for line in result.stderr.splitlines() if line.startswith("dropanchor")] == [
         f"dropanchor {subcommand}: Zenoh cannot listen on {endpoint}: the port is in use. "
@@ -52,7 +41,7 @@ def test_a_taken_zenoh_port_is_reported_in_one_sentence(subcommand: str) -> None
 def test_bad_settings_are_reported_with_file_and_key(tmp_path: Path) -> None:
     file = tmp_path / "yard.toml"
     file.write_text("[http]\nprot = 80\n")
-    result = run("serve", "--config", str(file), DROPANCHOR_MAX_TAGS="none")
+    result = ended("serve", "--config", str(file), DROPANCHOR_MAX_TAGS="none")
     assert result.returncode == 2
     assert f"{file}: http.prot is not a setting; did you mean port?" in result.stderr
     assert "the environment: max_tags" in result.stderr
@@ -100,6 +89,6 @@ def test_a_service_is_ready_while_the_router_of_the_command_runs_and_both_stop_o
 
 def test_the_help_contains_examples() -> None:
     for arguments in ((), ("serve",)):
-        result = run(*arguments, "--help")
+        result = ended(*arguments, "--help")
         assert result.returncode == 0
         assert "examples:" in result.stdout

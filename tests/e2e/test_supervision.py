@@ -2,10 +2,6 @@
 
 import signal
 import socket
-import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -14,12 +10,11 @@ from dropanchor_service.commands import serve
 from dropanchor_service.runtime.memory import HeapTrimmer
 from dropanchor_service.runtime.systemd import Systemd
 from support.patience import PATIENCE_S
-from support.service import environment
+from support.service import ended, running_service
 from support.zenoh_router import free_endpoint
 
-WITH_A_DYING_THREAD = """
-import sys, threading
-from dropanchor_service import cli
+A_DYING_THREAD = """
+import threading
 
 run = threading.Thread.run
 
@@ -29,47 +24,34 @@ def run_or_die(thread):
     run(thread)
 
 threading.Thread.run = run_or_die
-sys.exit(cli.main(sys.argv[1:]))
 """
-
-
-@contextmanager
-def service(*arguments: str, program: str | None = None, **variables: str) -> Iterator["subprocess.Popen[str]"]:
-    """Run `dropanchor serve`, or a `program` that does so, with these environment variables. Kill it at the end."""
-    start = ["-m", "dropanchor_service"] if program is None else ["-c", program]
-    ports = ["--port", "0", "--zenoh-listen", free_endpoint()]
-    command = [sys.executable, *start, "serve", *ports, *arguments]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment(**variables)) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
 
 
 @pytest.mark.parametrize("thread", ["ingest", "checkpoints", "poses", "http"])
 def test_a_thread_that_dies_is_named_and_the_process_exits_with_an_error(tmp_path: Path, thread: str) -> None:
-    program = WITH_A_DYING_THREAD.format(name=thread)
-    with service("--engine", "fleet", "--data-dir", str(tmp_path), program=program) as process:
-        _, log = process.communicate(timeout=300.0)
-    assert process.returncode == 1
-    assert f"the thread {thread} has died" in log
-    assert "injected" in log
+    ports = ("--port", "0", "--zenoh-listen", free_endpoint())
+    died = ended("serve", *ports, "--data-dir", str(tmp_path), before=A_DYING_THREAD.format(name=thread))
+    assert died.returncode == 1
+    assert f"the thread {thread} has died" in died.stderr
+    assert "injected" in died.stderr
 
 
-def test_systemd_is_notified_of_the_start_of_progress_and_of_the_stop(tmp_path: Path) -> None:
+def test_systemd_is_notified_of_the_start_of_progress_and_of_the_stop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(str(tmp_path / "notify"))
         manager.settimeout(300.0)
-        with service(NOTIFY_SOCKET=str(tmp_path / "notify")) as process:
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        with running_service(ready=False) as service:
             assert manager.recv(100) == b"READY=1"
             assert [manager.recv(100) for _ in range(3)] == 3 * [b"WATCHDOG=1"]
-            process.send_signal(signal.SIGTERM)
+            service.process.send_signal(signal.SIGTERM)
             notification = manager.recv(100)
             while notification == b"WATCHDOG=1":
                 notification = manager.recv(100)
             assert notification == b"STOPPING=1"
-            process.communicate(timeout=PATIENCE_S)
-        assert process.returncode == 0
+            assert service.process.wait(PATIENCE_S) == 0
 
 
 def test_the_watchdog_is_not_fed_while_no_samples_are_fused(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 import json
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -20,11 +19,12 @@ from dropanchor_schemas import keys
 from dropanchor_schemas.epochs import EpochFence
 from dropanchor_service.api.routes import event_examples
 from dropanchor_service.commands.serve import EXIT_GONE
+from support.commands import Ended
 from support.live_tags import LiveTags, distance, fused, is_current, poses_of, samples_of
 from support.patience import PATIENCE_S
 from support.postgresql import Postgresql, needs_postgresql, running_postgresql
 from support.relay import running_relay
-from support.service import Running, command, environment, running_service
+from support.service import Running, ended, running_service
 from support.zenoh_router import connected_session, wait_until
 
 TAGS = 3
@@ -90,9 +90,8 @@ class Cluster:
         service = running_service(*options, "--zenoh-connect", self._router, ready=False)
         return self._opened.enter_context(service)
 
-    def run(self, *arguments: str) -> "subprocess.CompletedProcess[str]":
-        words = command("cluster", *arguments, "--url", self.database.url())
-        return subprocess.run(words, capture_output=True, text=True, env=environment(), check=False, timeout=PATIENCE_S)
+    def run(self, *arguments: str) -> Ended:
+        return ended("cluster", *arguments, "--url", self.database.url())
 
 
 def readiness(service: Running) -> str:

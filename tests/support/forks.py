@@ -40,6 +40,7 @@ while True:
     else:
         answer = os.fork()
     if not answer and "words" in request:
+        exec(request["before"])
         asked.close()
         for number, file in enumerate(files, 1):
             os.dup2(file, number)
@@ -103,11 +104,11 @@ class Server:
         self._socket.close()
         self._process.wait()
 
-    def start(self, words: Sequence[str], environment: dict[str, str]) -> Forked:
-        """Run `dropanchor` with these words. Its stdout is that of this process."""
+    def start(self, words: Sequence[str], environment: dict[str, str], before: str, stdout: int) -> Forked:
+        """Run `dropanchor` with these words, and a program in it before."""
         reading, writing = os.pipe()
-        request = {"words": list(words), "folder": os.getcwd(), "environment": environment}
-        pid = self.ask(request, 1, writing)
+        request = {"words": list(words), "folder": os.getcwd(), "environment": environment, "before": before}
+        pid = self.ask(request, stdout, writing)
         os.close(writing)
         return Forked(self, pid, reading)
 
@@ -133,6 +134,9 @@ def can_be_forked() -> bool:
     return read_at_import(environment()) == _server().read
 
 
-def start_forked(words: Sequence[str], environment: dict[str, str]) -> Forked:
-    """Run `dropanchor` with these words in a process of its own."""
-    return _server().start(words, environment)
+def start_forked(words: Sequence[str], environment: dict[str, str], before: str = "", stdout: int = 1) -> Forked:
+    """Run `dropanchor` with these words in a process of its own. before: a program that runs there before it.
+
+    stdout: a file of this process.
+    """
+    return _server().start(words, environment, before, stdout)

@@ -12,6 +12,7 @@ STARTERS = {
     "compile_once",
     "connected_session",
     "dropping_router",
+    "ended",
     "in_words",
     "listening",
     "mosquitto",

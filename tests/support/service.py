@@ -12,12 +12,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Thread
+from tempfile import TemporaryFile
+from threading import Thread, Timer
 from typing import Any
 
 import httpx
 
 from dropanchor_schemas.wire import Frame, HeadingSample, ImuSample, RangeSample
+from support.commands import Ended
 from support.forks import Forked, can_be_forked, start_forked
 from support.kernel_cache import compile_once
 from support.patience import PATIENCE_S
@@ -68,6 +70,21 @@ class Running:
 
 def command(*arguments: str) -> list[str]:
     return [sys.executable, "-m", "dropanchor_service", *arguments]
+
+
+def ended(*words: str, before: str = "", **variables: str) -> Ended:
+    """Run `dropanchor` until it exits, or is killed. before: a program that runs in its process before. variables: environment."""
+    compile_once()
+    with TemporaryFile("w+") as output:
+        process = start_forked(words, environment(**variables), before, output.fileno())
+        late = Timer(PATIENCE_S, process.kill)
+        late.start()
+        with process.stderr:
+            errors = process.stderr.read()
+        code = process.wait()
+        late.cancel()
+        output.seek(0)
+        return Ended(code, output.read(), errors)
 
 
 def with_wrong_clock(words: list[str], ahead_s: float) -> list[str]:

@@ -1,12 +1,11 @@
 """`dropanchor doctor` finds what is wrong with a tag, now and at a time that is past, and its exit code says so."""
 
-import subprocess
 import time
 from pathlib import Path
 
 from dropanchor_schemas.wire import ENCODING_JSON
 from support.commands import Ended
-from support.service import command, environment
+from support.service import ended
 from support.yard import running_yard
 from support.zenoh_router import free_port, wait_until
 
@@ -14,9 +13,7 @@ TAG = "forklift-7"
 
 
 def doctor(url: str, *options: str) -> Ended:
-    words = command("doctor", "--url", url, *options)
-    done = subprocess.run(words, env=environment(), capture_output=True, text=True, check=False)
-    return Ended(done.returncode, done.stdout, done.stderr)
+    return ended("doctor", "--url", url, *options)
 
 
 def test_a_rejection_a_change_of_settings_and_silence_are_found_with_their_times(tmp_path: Path) -> None:

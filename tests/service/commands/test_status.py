@@ -1,7 +1,6 @@
 """`dropanchor status` shows what a running service answers, and its exit code says whether all is well."""
 
 import json
-import subprocess
 from pathlib import Path
 
 from dropanchor_schemas.wire import ENCODING_JSON
@@ -9,7 +8,7 @@ from dropanchor_service.security.api_keys import ApiKeys
 from dropanchor_service.security.identity import Scope
 from support.commands import Ended
 from support.secured import secured_site
-from support.service import command, environment, running_service
+from support.service import ended, running_service
 from support.yard import running_yard
 from support.zenoh_router import free_endpoint, free_port, wait_until
 
@@ -17,9 +16,7 @@ ZONE = {"id": "dock", "shape": {"type": "circle", "x": 10.0, "y": 0.0, "radius_m
 
 
 def status(url: str, *options: str, **variables: str) -> Ended:
-    words = command("status", "--url", url, *options)
-    done = subprocess.run(words, env=environment(**variables), capture_output=True, text=True, timeout=60, check=False)
-    return Ended(done.returncode, done.stdout, done.stderr)
+    return ended("status", "--url", url, *options, **variables)
 
 
 def test_tags_zones_events_and_what_is_refused_are_shown(tmp_path: Path) -> None:
