@@ -73,7 +73,10 @@ def command(*arguments: str) -> list[str]:
 
 
 def ended(*words: str, before: str = "", **variables: str) -> Ended:
-    """Run `dropanchor` until it exits, or is killed. before: a program that runs in its process before. variables: environment."""
+    """Run `dropanchor` until it exits, or is killed. variables: more of its environment.
+
+    before: a program that runs in its process before.
+    """
     compile_once()
     with TemporaryFile("w+") as output:
         process = start_forked(words, environment(**variables), before, output.fileno())
