@@ -54,7 +54,7 @@ def test_the_report_has_every_experiment(tmp_path: Path, capsys: pytest.CaptureF
     write_square(tmp_path / "data" / "square", range_std_m=0.05)
     out, page = tmp_path / "out", tmp_path / "paper.md"
     page.write_text("# The paper\n\n<!-- place for paper -->\n")
-    options = ["--into", str(page), "--quick", "--out", str(out), "--data", str(tmp_path / "data"), "--processes", "2"]
+    options = ["--into", str(page), "--quick", "--out", str(out), "--data", str(tmp_path / "data"), "--processes", "1"]
     assert main(["evaluate", "paper", *options]) == 0
     assert "100%" in capsys.readouterr().err
     found: Any = json.loads((out / "results.json").read_text())

@@ -8,7 +8,7 @@ from dropanchor_schemas.wire import Rejection, decode_packed
 from support.ingest import IngestBench
 from support.traffic import traffic
 
-FRAMES = int(os.environ.get("DROPANCHOR_MUTATED_FRAMES", "200000"))
+FRAMES = int(os.environ.get("DROPANCHOR_MUTATED_FRAMES", "60000"))
 TAGS = 20
 IN_ONE_TURN = 1000
 
