@@ -1,12 +1,14 @@
 """With many tags the map stays legible, and says what lies beside it."""
 
+import time
+
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 
 from dropanchor_service.estimation.columns import Frame
 from service.dashboard.place import Place
-from support.browser import watched_page
+from support.browser import WatchedPage, watched_page
 
 pytestmark = pytest.mark.browser
 
@@ -26,6 +28,30 @@ def around(pixel: list[float], reach: float) -> list[float]:
     return [pixel[0] - reach, pixel[1] - reach, pixel[0] + reach, pixel[1] + reach]
 
 
+def count_circles(page: Page) -> None:
+    """Count the circles that the page draws, in `circles`."""
+    page.add_init_script(
+        "const arc = CanvasRenderingContext2D.prototype.arc; window.circles = 0;"
+        "CanvasRenderingContext2D.prototype.arc = function (...place) { circles++; return arc.apply(this, place); };"
+    )
+
+
+def check_stamps(page: WatchedPage, place: Place) -> None:
+    """A drawing of a crowd stamps its dots, each where its tag is, and draws a circle for few of them."""
+    x, y = (values.ravel() for values in np.meshgrid(np.linspace(-13.0, 13, 40), np.linspace(-13.0, 13, 40)))
+    crowd = [f"crowd-{number}" for number in range(len(x))]
+    for moved in (0.0, 0.2):
+        page.page.evaluate("window.circles = 0; window.before = dropanchor.drawing().drawings")
+        fresh_ns = time.time_ns() + 600 * 10**9
+        place.move(*crowd, x=x + moved, y=y, heading=np.linspace(-3.1, 3.1, len(x)), t_ns=fresh_ns)
+        page.wait_for(f"dropanchor.tags().find(({{ tag }}) => tag === '{crowd[0]}')?.x > {x[0] + moved - 0.01}")
+        page.wait_for(f"dropanchor.drawing().still && dropanchor.drawing().visible >= {len(x)}")
+    assert page.page.evaluate("circles / (dropanchor.drawing().drawings - before + 1)") < len(x) / 4
+    known = page.tags()
+    seen = page.pixels([known[name]["pixel"] for name in crowd[::97]])
+    assert sum(pixel[:3] == pytest.approx((0x00, 0x67, 0xB8), abs=12) for pixel in seen) > 0.8 * len(seen)
+
+
 def test_names_and_ellipses_of_a_crowd_have_room_and_tags_beside_the_map_are_counted(
     chromium: Browser, place: Place
 ) -> None:
@@ -34,7 +60,7 @@ def test_names_and_ellipses_of_a_crowd_have_room_and_tags_beside_the_map_are_cou
     place.move(*names, x=x, y=y)
     place.move("rough", x=0.0, y=5.0, cov=np.diag([400.0, 1.0, 0.001]))
     place.move("turned", x=1.0, y=1.0, frame=Frame.RELATIVE)
-    with watched_page(chromium, place.url, size=(1440, 900), locale="de-DE") as page:
+    with watched_page(chromium, place.url, size=(1440, 900), locale="de-DE", prepare=count_circles) as page:
         page.wait_for_map(len(x) + 2)
         left, right = (page.page.evaluate(f"dropanchor.screen({edge}, 5)[0]") for edge in (-WIDE_M, WIDE_M))
         assert left > 0
@@ -71,4 +97,5 @@ def test_names_and_ellipses_of_a_crowd_have_room_and_tags_beside_the_map_are_cou
             page.wait_for("dropanchor.drawing().still")
             page.wait_for(f"{BESIDE} + {IN_VIEW} === {len(x) + 2}")
         assert page.page.evaluate(IN_VIEW) == len(x) + 2
+        check_stamps(page, place)
         assert page.errors == []

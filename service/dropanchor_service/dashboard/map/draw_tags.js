@@ -19,16 +19,30 @@ export const markerRadius = (count) => (count <= 200 ? 5.5 : count <= 1500 ? 4 :
 /** @param {number} radius */
 const isCrowd = (radius) => radius < 4;
 
-/** @param {Scene} scene */
-export function drawMarkers(scene) {
+/** @param {Scene} scene @param {import("./stamps.js").Stamps} stamps for crowds */
+export function drawMarkers(scene, stamps) {
   const radius = markerRadius(scene.rows.length);
   for (const group of alike(scene)) {
     const rows = group.rows.filter((row) => !hasGhosts(scene.fleet, row));
     scene.ctx.globalAlpha = 1;
-    strokeHeadings(scene, group, rows, radius);
-    paintMarkers(scene, group, rows, radius);
+    if (isCrowd(radius)) stamps.draw(scene, `${group.state} ${group.stale}`, rows, (...place) => paintOne(scene, group, radius, ...place));
+    else paintAlike(scene, group, rows, radius);
   }
   scene.ctx.globalAlpha = 1;
+}
+
+/** @param {Scene} scene @param {{state: number, stale: number}} group @param {number[]} rows @param {number} radius */
+function paintAlike(scene, group, rows, radius) {
+  strokeHeadings(scene, group, rows, radius);
+  paintMarkers(scene, group, rows, radius);
+}
+
+/** Paint the dot of a stamp. @param {Scene} scene @param {{state: number, stale: number}} group @param {number} radius
+ * @param {CanvasRenderingContext2D} ctx @param {number} heading_rad @param {number} centre_px */
+function paintOne(scene, group, radius, ctx, heading_rad, centre_px) {
+  const view = /** @type {any} */ ({ screenX: () => centre_px, screenY: () => centre_px });
+  const fleet = /** @type {any} */ ({ drawnX: [0], drawnY: [0], number: { heading_rad: [heading_rad] } });
+  paintAlike({ ...scene, ctx, view, fleet }, group, [0], radius);
 }
 
 /** Draw tags of other floors as faint rings. @param {Scene} scene @param {Int32Array} rows */

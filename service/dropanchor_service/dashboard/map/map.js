@@ -15,6 +15,7 @@ import { placesToFit } from "./places_to_fit.js";
 import { readPalette, withoutStates } from "./palette.js";
 import { nearest, rowsInView } from "./scene.js";
 import { LAYERS, Ticks } from "../data/ticks.js";
+import { Stamps } from "./stamps.js";
 import { View, boundsAround, limited } from "./view.js";
 
 const SMOOTH_UP_TO = 1000;
@@ -52,6 +53,7 @@ export class LiveMap extends EventTarget {
   stats = { drawings: 0, ms: 0, visible: 0, elsewhere: 0, density: false, labels: /** @type {number[][]} */ ([]) };
   #ctx;
   #labels = new Labels();
+  #stamps = new Stamps();
   #rows = new Int32Array(0);
   #isScheduled = false;
   #last = 0;
@@ -293,7 +295,7 @@ export class LiveMap extends EventTarget {
     const apart = density ? only : scene;
     drawSelection(apart);
     this.stats.labels = this.#labels.draw(density ? only : of("names"), this.hints);
-    drawMarkers(apart);
+    drawMarkers(apart, this.#stamps);
     drawColours(apart); // above the halos of the dots
   }
 }

@@ -11,7 +11,7 @@ export default {
   "plans.page": "Seite",
   "plans.crs": "Koordinatensystem",
   "plans.crs_title": "EPSG und eine Nummer, oder site für das System des Standorts",
-  "plans.new": "Grundriss hinzufügen …",
+  "plans.new": "Plan hinzufügen …",
   "plans.add": "Plan hinzufügen",
   "plans.plan": "Grundriss",
   "plans.all_floors": "alle Stockwerke",
