@@ -13,6 +13,7 @@ from dropanchor_service.estimation.columns import Frame, State
 from dropanchor_service.events.drafts import Draft, Stay
 from dropanchor_service.history.storage import Retention
 from service.dashboard.place import Place, live_api_bench
+from service.dashboard.zone_place import disc
 from support.browser import WatchedPage
 from support.http_server import running_server
 
@@ -45,6 +46,7 @@ def past_place(folder: Path) -> Iterator[tuple[Place, int]]:
     events = EventParts.in_memory("default")
     entered = {"t_ns": end_ns - 100 * SECOND, "since_ns": end_ns - 101 * SECOND, "zone": "dock", "name": "Dock"}
     later = {**entered, "t_ns": end_ns + 600 * SECOND}
+    events.items.zones.put("ramp", disc("ramp", 155.0, 0.0, 3.0, name="Ramp"))
     drafts = [Draft(EventType.ZONE_ENTER, "first", data) for data in (entered, later)]
     events.store.commit(drafts, {}, [Stay("first", "dock", end_ns - 4000 * SECOND, end_ns - 100 * SECOND)])
     with running_server(bench.app(DASHBOARD, events=events), bench.stopping) as port:

@@ -120,7 +120,7 @@ def test_every_text_about_the_past_and_a_lost_connection_is_from_the_catalogue(
     past: tuple[Place, int],
 ) -> None:
     place, end_ns = past
-    data = ("first", "second", "turned", "default", "Dock")
+    data = ("first", "second", "turned", "default", "Dock", "Ramp")
     with ExitStack() as stack:
         page = open_marked(stack, chromium, link_to(place, end_ns, 30.5, tag="first", heat="1"))
         wait_for_past(page, 3)

@@ -59,6 +59,10 @@ def test_a_link_leads_to_a_moment_of_the_past_and_back_to_the_present(
             "second": "ambiguous",
             "turned": "relative",
         }
+        page.page.locator("#filter").fill("zone:ramp")
+        expect(page.page.locator("#count")).to_have_text("1 of 3 tags")  # of the shown moment, not of the present
+        expect(page.page.locator("tr[data-tag='first']")).to_be_visible()
+        page.page.get_by_role("button", name="Show all", exact=True).click()
         page.page.locator("#events summary").click()
         (event,) = page.page.locator("#events li").all()  # not the one after the period
         assert "entered Dock" in event.inner_text()

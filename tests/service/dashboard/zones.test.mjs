@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { newId } from "../../../service/dropanchor_service/dashboard/zones/editor.js";
 import { newestFirst, retractedBy } from "../../../service/dropanchor_service/dashboard/zones/event_log.js";
-import { handlesOf, movedTo, placeIn, withCorner, withoutCorner } from "../../../service/dropanchor_service/dashboard/zones/shape_edit.js";
+import { handlesOf, isInside, movedTo, placeIn, withCorner, withoutCorner } from "../../../service/dropanchor_service/dashboard/zones/shape_edit.js";
 import { clock, probability, sentence } from "../../../service/dropanchor_service/dashboard/zones/words.js";
 
 const SQUARE = { type: "polygon", points: [[0, 0], [4, 0], [4, 4], [0, 4]] };
@@ -20,6 +20,16 @@ test("a sentence has the name, the time and the measures of its event", () => {
   };
   for (const [type, text] of Object.entries(sentences)) assert.equal(sentence(event(`dropanchor.${type}`)), text);
   assert.equal(sentence(event("dropanchor.zone.enter", { name: "" })), "a entered yard");
+});
+
+test("a place is in a zone by its shape and its heights", () => {
+  const [all, low] = [{ z_min_m: null, z_max_m: null }, { z_min_m: null, z_max_m: 2 }];
+  const bay = { type: "polygon", points: [[0, 0], [4, 0], [4, 4], [2, 1], [0, 4]] };
+  const disc = { type: "circle", x: 1, y: 1, radius_m: 1 };
+  for (const [shape, x, y, is] of [[bay, 1, 1, true], [bay, 2, 2, false], [bay, 5, 1, false], [disc, 1.7, 1.7, true], [disc, 1.8, 1.8, false]]) {
+    assert.equal(isInside({ shape, ...all }, x, y, NaN), is, `${x}, ${y}`);
+  }
+  assert.deepEqual([1, 3, NaN].map((z) => isInside({ shape: disc, ...low }, 1, 1, z)), [true, false, true]);
 });
 
 test("an event that is not true is struck through, and the one that says so says why", () => {

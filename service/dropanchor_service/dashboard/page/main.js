@@ -58,7 +58,7 @@ const fleet = new Fleet();
 const trails = new Trails();
 const roster = new Roster(fleet);
 /** @type {Choice} */
-const choice = new Choice({ care: (tag) => roster.needsCare(tag), alarms: (tag) => alarms.rank(tag) > 0 }, (tag) => zones.store.zonesOf(tag));
+const choice = new Choice({ care: (tag) => roster.needsCare(tag), alarms: (tag) => alarms.rank(tag) > 0 }, (tag) => zones.zonesOf(tag));
 const connection = new Connection();
 const evidence = new Evidence();
 const map = new LiveMap(byId("map"), byId("tools"), fleet, trails, roster, choice, evidence);
@@ -86,7 +86,7 @@ detail.heights.floors = () => plans.floors.all;
 detail.heightsInPast = (/** @type {string} */ tag) => past.heightsOf(tag);
 const zones = new Zones(map, connection, setup.changes, (tag) => fleet.row(tag) >= 0 && select(tag), panels);
 zones.follow(past);
-columns.about = { zonesOf: (/** @type {string} */ tag) => zones.store.zonesOf(tag), batteryOf: (/** @type {string} */ tag) => roster.of(tag)?.health?.battery_fraction ?? NaN };
+columns.about = { zonesOf: (/** @type {string} */ tag) => zones.zonesOf(tag), batteryOf: (/** @type {string} */ tag) => roster.of(tag)?.health?.battery_fraction ?? NaN };
 zones.store.wantsNames = () => columns.isShown("zone") || choice.asksFor("zone");
 const finding = new Finding({ map, fleet, roster, choice, table, setup, plans, zones, measure, past, panels, select, pickAll, byId });
 const alarms = new Alarms(map, connection, setup.changes, choice, zones);

@@ -55,3 +55,16 @@ export function placeIn({ detail_phrase }) {
   const [x, y] = detail_phrase?.values["what.place"]?.split(", ").map(Number) ?? [];
   return Number.isFinite(x) && Number.isFinite(y) ? [x, y] : null;
 }
+
+/** Return whether a place is in a zone. A height that is not known is in all of them. @param {import("./zone_store.js").Zone} zone
+ * @param {number} x @param {number} y @param {number} z NaN: not known */
+export function isInside({ shape, z_min_m, z_max_m }, x, y, z) {
+  if (z < (z_min_m ?? -Infinity) || z > (z_max_m ?? Infinity)) return false;
+  if (shape.type === "circle") return Math.hypot(x - shape.x, y - shape.y) <= shape.radius_m;
+  const { points } = shape;
+  const crossed = points.filter(([x1, y1], i) => {
+    const [x2, y2] = points[(i + 1) % points.length];
+    return y1 > y !== y2 > y && x < x1 + ((y - y1) * (x2 - x1)) / (y2 - y1);
+  });
+  return crossed.length % 2 === 1;
+}

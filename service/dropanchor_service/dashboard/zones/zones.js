@@ -7,7 +7,7 @@ import { EventList } from "./event_list.js";
 import { EventLog } from "./event_log.js";
 import { Headcount } from "./headcount.js";
 import { Handles } from "./handles.js";
-import { withCorner } from "./shape_edit.js";
+import { isInside, withCorner } from "./shape_edit.js";
 import { EventFilter } from "./event_filter.js";
 import { FoundEvents } from "./found_events.js";
 import { ZoneForm } from "./zone_form.js";
@@ -102,6 +102,16 @@ export class Zones {
       this.replay = isPast ? past.replay : null;
       this.#find();
     };
+  }
+
+  /** Return the names of the zones in which a tag is: as the service counts it, and in the past by the pose that is shown. @param {string} tag */
+  zonesOf(tag) {
+    if (!this.replay) return this.store.zonesOf(tag);
+    const { fleet } = this.map;
+    const row = fleet.row(tag);
+    if (row < 0 || !fleet.style(row).placed || fleet.isTurned(row)) return [];
+    const { x, y, z } = fleet.number;
+    return this.store.zones.filter((zone) => isInside(zone, x[row], y[row], z[row])).map(({ id, name }) => name || id);
   }
 
   /** List the events that are wanted; where nothing is said, the latest ones. */
