@@ -6,7 +6,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from dropanchor_schemas.models import Exact, Frozen
-from dropanchor_schemas.pose import TrackingState
+from dropanchor_schemas.pose import Phrase, TrackingState
 from dropanchor_schemas.site import Anchor, Number, TagSettings
 
 MOST_NS = 1_800_000_000_000  # of a run with other settings: half an hour
@@ -53,6 +53,16 @@ class Incident(Frozen):
     count: int
 
 
+class Cause(Frozen):
+    """What made the poses of a tag wrong though no setting changed, as its samples or those of all tags show."""
+
+    text: str
+    phrase: Phrase = Field(description="That sentence by its code.")
+    from_ns: int = Field(description="UTC, ns: shortly before it began, for a run with what is told below.")
+    settings: TagSettings = Field(default=TagSettings(), description="Settings that would have been right since.")
+    anchor: str | None = Field(default=None, description="The anchor that was moved. Only people know where to.")
+
+
 class Past(Frozen):
     """What happened to a tag until a time that is past, and a little after it."""
 
@@ -60,6 +70,7 @@ class Past(Frozen):
     run_from_ns: int = Field(description="UTC, ns: the checkpoint from which the engine ran again.")
     states: list[StateChange] = Field(description="What state the tag had first, and each change until `at_ns`.")
     incidents: list[Incident] = Field(description="Of the run, up to `at_ns`; the newest 200.")
+    causes: list[Cause] = Field(default=[], description="What was wrong then; empty where nothing shows it.")
     track: TrackColumns = Field(description="The poses of the minute before.")
     next: TrackColumns = Field(description="The poses of the ten seconds after, as the service then told them.")
 

@@ -2,21 +2,26 @@
 
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from math import dist
 from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
+from dropanchor_schemas.site import Anchor
+from dropanchor_service.store import SiteStore
+from dropanchor_tag_client.simulator.live import simulation
 from support.browser import running_chromium, watched_page
-from support.live_tags import LiveTags, is_current, poses_of
+from support.scripted_past import MODELS, Script, write_past
 from support.service import Running, running_service
-from support.zenoh_router import free_endpoint, router_process, wait_until
 
 pytestmark = pytest.mark.browser
 S = 1_000_000_000
-TURNED, JUMPED, UNTOUCHED = "sim-1", "sim-2", "sim-3"
+TAGS, SEED = 5, 5
+TURNED, JUMPED, SET, UNTOUCHED = "sim-1", "sim-2", "sim-3", "sim-5"
+AT_S, MOVED_S, CORRECTED_S, END_S = 30.0, 60.0, 75.0, 80.0
+AWAY_X = 8.0
 MOST_CLICKS = 5
 MOUNT, ANCHOR = "mount_angle_rad: null → 1.57", "x: 0 → 25"
 
@@ -27,31 +32,28 @@ def chromium() -> Iterator[Browser]:
         yield browser
 
 
+def mount_otherwise(site: SiteStore) -> None:
+    site.set_tag(SET, site.tag_settings(SET).model_copy(update={"mount_angle_rad": 1.57}))
+
+
+def move_anchor(site: SiteStore) -> None:
+    site.set_anchor(Anchor(id="1", x=25.0))
+
+
 @pytest.fixture(scope="module")
-def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
-    """A service whose tags have gone wrong: a mounting angle changes, a clock jumps, then the anchor moves."""
-    folder, endpoint = tmp_path_factory.mktemp("then"), free_endpoint()
-    tags = LiveTags(endpoint, 3, 5)
-    config = tags.write_settings(folder)
-    options = ("--config", str(config), "--data-dir", str(folder / "data"), "--zenoh-connect", endpoint)
-    with ExitStack() as stack:
-        stack.enter_context(router_process(endpoint))
-        service = stack.enter_context(running_service(*options))
-        stack.enter_context(tags)  # whose starts are known, so that the service must not miss the first metres
+def t0_ns() -> int:
+    """The past begins an hour ago."""
+    return (time.time_ns() - 3600 * S) // S * S
 
-        def go_on(seconds: int) -> None:
-            then_ns = time.time_ns() + seconds * S
-            wait_until(lambda: min(pose["t_ns"] for pose in poses_of(service).values()) > then_ns)
 
-        wait_until(lambda: is_current(service, 3))
-        go_on(4)
-        path = f"/api/v1/tags/{TURNED}/settings"
-        service.put(path, service.get(path) | {"mount_angle_rad": 1.57})
-        tags.clock_ns[JUMPED] = -60 * S
-        go_on(6)
-        service.put("/api/v1/anchors/1", {"id": "1", "x": 25.0})
-        go_on(3)
-        tags.finish()
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory, t0_ns: int) -> Iterator[Running]:
+    """A service whose tags went wrong: by a setting, a clock and a hand on a tag, then by the anchor and its place."""
+    folder = tmp_path_factory.mktemp("then")
+    changes = {AT_S: mount_otherwise, CORRECTED_S: move_anchor}
+    script = Script(TURNED, JUMPED, AT_S, AWAY_X, MOVED_S, changes)
+    config = write_past(folder, TAGS, SEED, t0_ns, END_S, script)
+    with running_service("--config", str(config), "--data-dir", str(folder / "data")) as service:
         yield service
 
 
@@ -66,11 +68,34 @@ class Person:
         (self.page.locator(where) if isinstance(where, str) else where).click()
         self.clicks += 1
 
-    def go_to_the_end_of_the_past(self, tag: str) -> None:
+    def go_to(self, tag: str, at_ns: int) -> None:
         self.click(f"tr[data-tag='{tag}']")
         self.click("#history")
         expect(self.page.locator("#then")).to_be_visible()
-        self.page.locator("#past [data-part=slider]").press("End")
+        slider = self.page.locator("#past [data-part=slider]")
+        slider.fill("0")
+        from_ms = self.page.evaluate("dropanchor.past().time_ms")
+        slider.fill(str(round((at_ns / 1e6 - from_ms) / 1000)))
+        self.clicks += 1
+
+    def explain(self, cause: str) -> Locator:
+        """Ask why, and return the line that says so."""
+        self.click("#then [data-part=explain]")
+        line = self.page.locator("#then [data-part=lines] li", has_text=cause)
+        expect(line).to_have_count(1)
+        assert self.clicks <= MOST_CLICKS
+        return line
+
+    def run_by(self, where: Locator) -> dict[str, Any]:
+        """Click what runs the time again, and return the answer once the page has said it."""
+        with self.page.expect_response(lambda answer: "/what-if" in answer.url) as found:
+            self.click(where)
+        run: dict[str, Any] = found.value.json()
+        assert run["began_at_pose"]
+        place = ", ".join(f"{run['what_if'][axis][-1]:.2f}".replace("-", "−") for axis in "xy")
+        answer = self.page.locator("#then form [data-part=answer]")
+        expect(answer).to_contain_text(f"it would have been at {place} m, {run['apart_m']:.2f} m from there")
+        return run
 
 
 @pytest.fixture
@@ -80,21 +105,15 @@ def person(chromium: Browser, service: Running) -> Iterator[Person]:
         assert watched.errors == []
 
 
-@pytest.mark.parametrize(("tag", "cause"), [(TURNED, MOUNT), (UNTOUCHED, ANCHOR)], ids=["mount", "anchor"])
+@pytest.mark.parametrize(("tag", "cause"), [(SET, MOUNT), (UNTOUCHED, ANCHOR)], ids=["mount", "anchor"])
 def test_a_change_is_found_and_tried_without_and_taken_back_and_that_undone(
-    service: Running, person: Person, tag: str, cause: str
+    service: Running, person: Person, t0_ns: int, tag: str, cause: str
 ) -> None:
-    person.go_to_the_end_of_the_past(tag)
+    person.go_to(tag, t0_ns + round((END_S - 1) * S))
     line = person.page.locator("#then [data-part=changes] li", has_text=cause)
     expect(line).to_have_count(1)
     assert person.clicks <= MOST_CLICKS
-    with person.page.expect_response(lambda answer: "/what-if" in answer.url) as found:
-        person.click(line.get_by_role("button", name="What if not"))
-    run = found.value.json()
-    assert run["began_at_pose"]
-    place = ", ".join(f"{run['what_if'][axis][-1]:.2f}".replace("-", "−") for axis in "xy")
-    answer = person.page.locator("#then form [data-part=answer]")
-    expect(answer).to_contain_text(f"it would have been at {place} m, {run['apart_m']:.2f} m from there")
+    person.run_by(line.get_by_role("button", name="What if not"))
     before = settings_of(service)
     person.click("#then [data-part=apply]")
     person.click(person.page.locator("#outcome").get_by_role("button", name="Undo"))
@@ -103,21 +122,39 @@ def test_a_change_is_found_and_tried_without_and_taken_back_and_that_undone(
 
 
 def settings_of(service: Running) -> tuple[Any, Any]:
-    return service.get(f"/api/v1/tags/{TURNED}/settings"), service.get("/api/v1/anchors/1")
+    return service.get(f"/api/v1/tags/{SET}/settings"), service.get("/api/v1/anchors/1")
 
 
-def test_a_clock_that_jumped_is_named_the_samples_are_saved_and_typed_settings_are_tried(person: Person) -> None:
-    person.go_to_the_end_of_the_past(JUMPED)
-    person.click("#then [data-part=explain]")
-    expect(person.page.locator("#then li", has_text="the clock of the tag was set")).to_have_count(1)
-    assert person.clicks <= MOST_CLICKS
+def test_a_clock_that_jumped_is_named_and_the_samples_are_saved(person: Person, t0_ns: int) -> None:
+    person.go_to(JUMPED, t0_ns + round((AT_S + 15) * S))
+    person.explain("the clock of the tag was set")
     with person.page.expect_download() as download:
         person.click("#then [data-part=save]")
     assert Path(download.value.path()).read_bytes().startswith(b"\x89MCAP")
+
+
+def test_a_tag_turned_on_its_vehicle_is_named_and_tried(person: Person, t0_ns: int) -> None:
+    person.go_to(TURNED, t0_ns + round((MOVED_S - 4) * S))
+    line = person.explain("The tag was turned on what carries it")
+    expect(person.page.locator("#then [data-part=lines] button")).to_have_count(1)  # the anchor is not blamed
+    run = person.run_by(line.get_by_role("button"))
+    assert person.clicks <= MOST_CLICKS
+    assert error_m(run["what_if"], TURNED, t0_ns) < 5.0 < error_m(run["as_was"], TURNED, t0_ns)
+
+
+def test_an_anchor_that_was_carried_away_is_named_and_its_new_place_tried(person: Person, t0_ns: int) -> None:
+    person.go_to(UNTOUCHED, t0_ns + round((CORRECTED_S - 1) * S))
+    line = person.explain("Anchor 1 seems to have moved by")
+    person.click(line.get_by_role("button"))
     form = person.page.locator("#then form")
-    form.locator("[name=motion]").select_option("carried")
-    form.locator("[name=anchor]").select_option("1")
-    form.locator("[name=x]").fill("3.5")
-    form.locator("[name=minutes]").fill("0.1")
-    person.click(form.get_by_role("button", name="Run it again"))
-    expect(form.locator("[data-part=answer]")).to_contain_text("With motion = carried, 1: 3.50,")
+    expect(form.locator("[name=x]")).to_be_focused()
+    form.locator("[name=x]").fill(str(AWAY_X))
+    run = person.run_by(form.get_by_role("button", name="Run it again"))
+    assert error_m(run["what_if"], UNTOUCHED, t0_ns) < 2.0 < error_m(run["as_was"], UNTOUCHED, t0_ns)
+
+
+def error_m(track: dict[str, list[Any]], tag: str, t0_ns: int) -> float:
+    """Return how far the end of a track is from where the tag truly was."""
+    truth = simulation("yard", SEED, int(tag[-1]) - 1, MODELS, END_S).truth
+    place = int(truth.t_s.searchsorted((track["t_ns"][-1] - t0_ns) / S))
+    return dist((track["x"][-1], track["y"][-1]), (truth.x[place], truth.y[place]))

@@ -5,12 +5,18 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from dropanchor_schemas.sentences import say
+from dropanchor_schemas.sentences import Sentence, say
 from dropanchor_service.estimation.columns import Array, StateReason
+from dropanchor_service.store.anchor_doubts import AnchorDoubt
 from dropanchor_service.store.tags import TagTable
 
 
-def anchor_moved(anchor: str, way_m: float, since_ns: int) -> str:
+def sentence_of(doubt: AnchorDoubt) -> Sentence:
+    """Return where an anchor seems to stand, and what to do."""
+    return anchor_moved(*doubt) if doubt.since_ns else anchor_misplaced(doubt.anchor, doubt.way_m)
+
+
+def anchor_moved(anchor: str, way_m: float, since_ns: int) -> Sentence:
     return say(
         "anchor_moved",
         "Anchor {anchor} seems to have moved by {way} m or more at {time} UTC: say where it is, or save it again to "
@@ -21,7 +27,7 @@ def anchor_moved(anchor: str, way_m: float, since_ns: int) -> str:
     )
 
 
-def anchor_misplaced(anchor: str, way_m: float) -> str:
+def anchor_misplaced(anchor: str, way_m: float) -> Sentence:
     return say(
         "anchor_misplaced",
         "Anchor {anchor}, or another one that its tags hear, seems to stand about {way} m from where the site says: "
@@ -35,5 +41,4 @@ def about_anchors(poses: Array, tags: TagTable) -> Iterator[tuple[str, int]]:
     """Yield which anchor seems to stand elsewhere, and the place of each pose that rests on it."""
     for place in np.flatnonzero(poses["reason"] == StateReason.ANCHOR_DOUBTED).tolist():
         if (doubt := tags.rows.anchor_doubts.of(int(poses["row"][place]))) is not None:
-            anchor, way_m, since_ns = doubt
-            yield anchor_moved(*doubt) if since_ns else anchor_misplaced(anchor, way_m), place
+            yield sentence_of(doubt), place

@@ -14,6 +14,7 @@ from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
 from dropanchor_service.checkpoints.format import sealed, unsealed
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.recording.reading import Turn
+from dropanchor_service.store.anchor_doubts import AnchorDoubt
 from dropanchor_service.store.site_values import SiteDocument
 
 LEVEL = 3  # of Zstandard: level 1 leaves 6 % more, and higher ones save 1 %
@@ -24,15 +25,18 @@ Messages = Sequence[tuple[int, bytes, str, int]]
 """Row, payload, encoding, UTC of arrival in ns."""
 TagKey = tuple[str, str]
 """Site and tag."""
+Doubts = Sequence[tuple[str, tuple[Any, ...]]]
+"""Site, and the fields of the `AnchorDoubt` of an anchor there."""
 
 
 @dataclass(frozen=True)
 class BoxTurn:
-    """A turn of the ingest. documents: of the sites that changed before it, by their ids."""
+    """A turn of the ingest. documents: of the sites that changed before it, by their ids. doubts: if these changed."""
 
     turn_ns: int
     messages: Messages = ()
     documents: Mapping[str, SiteDocument] = field(default_factory=dict)
+    doubts: Doubts | None = None
 
 
 def encoded_turns(turns: Sequence[BoxTurn], tags: Mapping[int, TagKey]) -> list[bytes]:
@@ -54,11 +58,17 @@ def encoded_turns(turns: Sequence[BoxTurn], tags: Mapping[int, TagKey]) -> list[
             for index, turn in enumerate(turns)
             for site, document in turn.documents.items()
         ],
+        "doubts": [(index, turn.doubts) for index, turn in enumerate(turns) if turn.doubts is not None],
         "lengths": [len(turns), len(every)],
     }
     packed = np.array([encoding.startswith(ENCODING_PACKED) for encoding in encodings], _IS_PACKED)
     whole = np.frombuffer(b"".join(payloads), np.uint8)
     return sealed(header, [*arrays.values(), packed, *_down(whole, arrays["sizes"], arrays["rows"])], LEVEL)
+
+
+def doubts_of(site: str, doubts: Doubts) -> list[AnchorDoubt]:
+    """Return the doubts of one site."""
+    return [AnchorDoubt(*doubt) for of, doubt in doubts if of == site]
 
 
 def _is_kept(encoding: str) -> bool:
@@ -88,6 +98,7 @@ class Block:
         header, content = unsealed(whole)
         self._tags: dict[int, TagKey] = {row: (site, tag) for row, site, tag in header["tags"]}
         self._documents: list[tuple[int, str, Any]] = header["documents"]
+        self._doubts: dict[int, Doubts] = dict(header.get("doubts", ()))
         turns, messages = header["lengths"]
         parts = {name: turns if name in ("turns", "counts") else messages for name in _COLUMNS}
         self._columns: dict[str, Array] = {}
@@ -99,15 +110,20 @@ class Block:
         self._payloads = np.frombuffer(content[begin:], np.uint8)
 
     def turns(self, site: str, tags: Set[str] | None = None) -> Iterator[Turn]:
-        """Yield the turns in which these tags of a site sent something, or the site changed. tags: None for all."""
+        """Yield the turns in which these tags of a site sent something, or what is known of the site changed.
+
+        tags: None for all.
+        """
         columns = self._columns
         wanted = {row: tag for row, (of, tag) in self._tags.items() if of == site and (tags is None or tag in tags)}
         payloads = self._payloads_of(np.isin(columns["rows"], list(wanted)))
         documents = {index: document for index, of, document in self._documents if of == site}
         in_turn = np.repeat(np.arange(len(columns["turns"])), columns["counts"])
-        found: dict[int, Turn] = {index: Turn(int(columns["turns"][index])) for index in documents}
+        found: dict[int, Turn] = {index: Turn(int(columns["turns"][index])) for index in {*documents, *self._doubts}}
         for index, document in documents.items():
             found[index].site = SiteDocument.model_validate(document)
+        for index, doubts in self._doubts.items():
+            found[index].doubts = doubts_of(site, doubts)
         for place in sorted(payloads):
             index = int(in_turn[place])
             turn = found.setdefault(index, Turn(int(columns["turns"][index])))

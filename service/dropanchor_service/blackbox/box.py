@@ -13,7 +13,7 @@ from pathlib import Path
 from threading import Event
 from typing import Self
 
-from dropanchor_service.blackbox.block import BoxTurn, Messages, encoded_turns
+from dropanchor_service.blackbox.block import BoxTurn, Doubts, Messages, encoded_turns
 from dropanchor_service.blackbox.pieces import Head, Limits, OpenPiece, drop_oldest, lacks_room, prune
 from dropanchor_service.checkpoints.format import Snapshot
 from dropanchor_service.checkpoints.snapshot import ServiceState
@@ -78,6 +78,7 @@ class BlackBox:
         self._changed: deque[int] = deque()  # indices of sites
         for site in sites:
             site.store.on_change(partial(self._changed.append, site.index))
+        self._doubts_told = 0  # of `AnchorDoubts.changes`
         self._began_s: float | None = None  # the last piece; None: a new one is to begin
         self._tried_s = -math.inf
         self._begin: _Begin | None = None  # the last one: at most one waits for the disk, whatever its size
@@ -114,8 +115,14 @@ class BlackBox:
             site = self._sites[self._changed.popleft()]
             documents[site.id] = site.store.document
         size = sum(len(message[1]) for message in messages) + MESSAGE_OVERHEAD * len(messages)
-        self.writer.put(BoxTurn(self._now_ns(), messages, documents), size)
+        is_known = self._doubts_told == self._sites.rows.anchor_doubts.changes
+        self.writer.put(BoxTurn(self._now_ns(), messages, documents, None if is_known else self._doubts()), size)
         self._messages += len(messages)
+
+    def _doubts(self) -> Doubts:
+        doubts = self._sites.rows.anchor_doubts
+        self._doubts_told = doubts.changes
+        return sorted({(self._sites.of_row(row).id, tuple(doubt)) for row, doubt in doubts.of_rows.items()})
 
     def write_now(self, wait_s: float) -> None:
         """Wait until what has arrived is written."""
@@ -162,7 +169,7 @@ class BlackBox:
         self._begin = _Begin(
             t_ns=self._now_ns(),
             session=self._session,
-            head=Head(self._metadata, documents, defaults),
+            head=Head(self._metadata, documents, defaults, self._doubts()),
             layout="" if self._state is None else self._state.layout,
             snapshot=self._snapshot(),
         )

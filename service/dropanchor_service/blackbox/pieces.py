@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from dropanchor_service.blackbox.block import Doubts
 from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, decoded, encoded, sealed, size_of, unsealed
 from dropanchor_service.runtime.open_below import open_below
 from dropanchor_service.store.site_values import SiteDocument
@@ -36,15 +37,19 @@ class Limits(NamedTuple):
 
 
 class Head(NamedTuple):
-    """What a run of a piece needs beside its checkpoint. metadata: as in a recording. documents: by site."""
+    """What a run of a piece needs beside its checkpoint. metadata: as in a recording. documents: by site.
+
+    doubts: of anchors, at the beginning.
+    """
 
     metadata: Mapping[str, str]
     documents: Mapping[str, SiteDocument]
     defaults: Mapping[str, Any]
+    doubts: Doubts = ()
 
     def packed(self) -> list[bytes]:
         documents = {site: document.model_dump(mode="json") for site, document in self.documents.items()}
-        return sealed({"metadata": self.metadata, "documents": documents, "defaults": self.defaults}, [])
+        return sealed(self._asdict() | {"documents": documents}, [])
 
 
 @dataclass(frozen=True)
@@ -78,7 +83,7 @@ class Piece:
         for _, content in self.records(HEAD):
             header, _ = unsealed(content)
             documents = {site: SiteDocument.model_validate(one) for site, one in header["documents"].items()}
-            return Head(header["metadata"], documents, header["defaults"])
+            return Head(header["metadata"], documents, header["defaults"], header.get("doubts", ()))
         raise CheckpointError("it has no beginning")
 
     def checkpoint(self) -> tuple[str, Snapshot] | None:

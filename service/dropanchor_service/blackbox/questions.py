@@ -9,11 +9,13 @@ from dropanchor_schemas.past import WhatIf
 from dropanchor_schemas.sentences import say
 from dropanchor_schemas.site import Site, StartPose, TagSettings
 from dropanchor_service.answers.explain import MINUTE_NS, explanation_of
+from dropanchor_service.blackbox.causes import causes_of
 from dropanchor_service.blackbox.chosen import BoxError
 from dropanchor_service.blackbox.rerun import Rerun, is_sure
 from dropanchor_service.recording.reading import Turn
 
 AFTER_NS = 10_000_000_000
+UNSURE_S = 1.0  # for which a tag may have been mounted in another way than a what-if says
 
 
 class Question(Exact):
@@ -45,6 +47,7 @@ def _explained(question: Question) -> dict[str, Any]:
         "run_from_ns": run.begin_ns,
         "states": [dict(zip(("t_ns", "state", "reason"), one, strict=True)) for one in run.states],
         "incidents": [*run.incidents],
+        "causes": causes_of(run),
         "track": run.track(at_ns - MINUTE_NS, at_ns),
     }
     run.run_to(at_ns + AFTER_NS)
@@ -82,7 +85,7 @@ def _change(run: Rerun, name: str, what: WhatIf) -> bool:
     site, now_ns = run.service.site, run.service.clock.now_ns()
     before = site.tag_settings(name)
     after = what.settings.over(before)
-    start = _place_of(run, before, after)
+    start = _place_of(run, after)
     changed = {anchor.number: anchor for anchor in what.anchors}
     anchors = [changed.pop(anchor.number, anchor) for anchor in site.site.anchors]
     update: dict[str, Any] = {"anchors": [*anchors, *changed.values()]}
@@ -97,11 +100,16 @@ def _change(run: Rerun, name: str, what: WhatIf) -> bool:
     return start is not None
 
 
-def _place_of(run: Rerun, before: TagSettings, after: TagSettings) -> StartPose | None:
-    """Return where the tag is, as a start; None if it does not know. Its body turns against an unchanged course."""
+def _place_of(run: Rerun, after: TagSettings) -> StartPose | None:
+    """Return where the tag is, as a start; None if it does not know.
+
+    Its body faces where its course and the mounting of until then tell. Where the mounting changes, nobody knows to the
+    second since when: the place allows for a while on another course.
+    """
     pose = None if run.row is None else run.service.latest.row(run.row)
     if pose is None or not is_sure(pose):
         return None
-    x, y, heading = (float(pose[name]) for name in ("x", "y", "heading"))
-    turned = (after.mount_angle_rad or 0.0) - (before.mount_angle_rad or 0.0)
-    return StartPose(x=x, y=y, heading_rad=heading - turned, std_m=max(float(pose["sigma_pos"]), 0.1))
+    x, y, course, speed, sigma = (float(pose[name]) for name in ("x", "y", "heading", "speed", "sigma_pos"))
+    before = run.settings.mount_angle_rad
+    astray = abs(speed) * UNSURE_S if after.mount_angle_rad != before else 0.0
+    return StartPose(x=x, y=y, heading_rad=course - (before or 0.0), std_m=max(sigma, 0.1) + astray)

@@ -14,13 +14,16 @@ from dropanchor_schemas.site import TagSettings
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.answers.columns import REASONS
 from dropanchor_service.answers.frames import STATES, in_site_frame
+from dropanchor_service.blackbox.block import doubts_of
 from dropanchor_service.blackbox.chosen import BoxError, chosen, turns_of
 from dropanchor_service.checkpoints.format import CheckpointError
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.estimation.columns import POSE, Array, Frame, State
+from dropanchor_service.ingest.decode import decode
 from dropanchor_service.offline.recorded_turns import OfflineService, settings_of
 from dropanchor_service.recording.reading import Turn
 from dropanchor_service.settings.model import Settings
+from dropanchor_service.store.anchor_doubts import AnchorDoubt
 
 MOST_INCIDENTS = 200
 SECOND_NS = 1_000_000_000
@@ -45,6 +48,7 @@ class Rerun:
             self.service = OfflineService(settings, document, TagSettings.model_validate(head.defaults[site]))
             if checkpoint is not None:
                 self._restore(*checkpoint)
+            self.service.engine.follow_doubts(0, doubts_of(site, head.doubts))  # one tag alone cannot tell
         except (OSError, KeyError, CheckpointError) as error:
             sentence = say("box_unusable", "The black box cannot be used at that time: {why}.", why=error)
             raise BoxError(sentence) from error
@@ -52,6 +56,7 @@ class Rerun:
         self.poses: list[Array] = []
         self.sure_ns: int | None = None
         self.states: list[tuple[int, str, str]] = []
+        self._sent: list[tuple[bytes, str, int]] = []  # payload, encoding and UTC of arrival, ns
         self.incidents: deque[dict[str, Any]] = deque(maxlen=MOST_INCIDENTS)
         self._counts = self._counted()
         references = {name for name, one in document.tags.items() if one.height_motion == "reference"}
@@ -74,11 +79,27 @@ class Rerun:
         found = self.service.tags.find(self._name)
         return None if found is None else found.row
 
+    @property
+    def doubt(self) -> AnchorDoubt | None:
+        """The anchor that is doubted on which the tag's poses rest."""
+        return None if self.row is None else self.service.tags.rows.anchor_doubts.of(self.row)
+
+    @property
+    def settings(self) -> TagSettings:
+        return self.service.site.tag_settings(self._name)
+
+    def imu(self) -> dict[str, Array]:
+        """Return acc and gyro (n, 3) that the tag sent, with when each arrived, UTC in ns."""
+        payloads, encodings, arrivals = zip(*self._sent, strict=True) if self._sent else ((), (), ())
+        sent = decode(payloads, encodings).columns()[0]
+        values = {name: sent[name].astype(float) for name in ("acc", "gyro")}
+        return values | {"arrival_ns": np.array(arrivals, np.int64)[sent["message"]]}
+
     def run_to(self, to_ns: int, adopt: bool = True) -> None:
-        """Run the turns until a time. adopt: follow the changes of the settings."""
+        """Run the turns until a time. adopt: follow the changes of the settings, and which anchor is doubted."""
         for turn in self._until(to_ns):
             if not adopt:
-                turn.site = None
+                turn.site = turn.doubts = None
             self._take(turn)
         self._take(Turn(to_ns))
 
@@ -95,6 +116,7 @@ class Rerun:
 
     def _take(self, turn: Turn) -> None:
         poses = self.service.take(turn)
+        self._sent += [message[1:] for message in turn.messages if message[0] == self._name]
         own = poses[poses["row"] == self.row] if self.row is not None else poses[:0]
         if len(own):
             self.poses.append(own.copy())

@@ -179,7 +179,9 @@ def _of_estimate(explanation: Mapping[str, Any]) -> Iterator[Finding]:
         weights = ", ".join(f"{one['weight']:.0%}" for one in explanation["hypotheses"])
         sentence += f", at one of {len(explanation['hypotheses'])} places: {weights}"
     yield Finding("estimate", sentence, is_wrong=pose["state"] in _UNSURE)
-    changes = (explanation.get("past") or {}).get("states", [])[-5:]
+    past = explanation.get("past") or {}
+    yield from (Finding("cause", cause["text"]) for cause in past.get("causes", ()))
+    changes = past.get("states", [])[-5:]
     for one in changes:
         yield Finding("estimate", f"{iso_utc(one['t_ns'])} {one['state']} ({one['reason']})", is_wrong=False)
 

@@ -9,7 +9,7 @@ ranges to two anchors soon agree on some place, and only the first one has not h
 
 import logging
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from statistics import median
 
 import numpy as np
@@ -44,6 +44,7 @@ class AnchorWatch:
         self._met: defaultdict[int, dict[int, float]] = defaultdict(dict)  # by row and anchor: m, of first ranges
         self._firsts: defaultdict[int, dict[int, float]] = defaultdict(dict)  # by anchor and row
         self._doubted: dict[int, AnchorDoubt] = {}
+        self._judges = True
         self.any_heard_several = False  # whether any row has ever heard more than one anchor
 
     def begin(self, row: int) -> None:
@@ -88,6 +89,13 @@ class AnchorWatch:
             if (doubt := self._doubted.pop(anchor, None)) is not None:
                 self._known.end(doubt)
 
+    def follow(self, doubted: Mapping[int, AnchorDoubt]) -> None:
+        """Doubt these anchors and no others from now on: whoever compared all tags has said so."""
+        self._judges = False
+        for doubt in self._doubted.values():
+            self._known.end(doubt)
+        self._doubted = {**doubted}
+
     def _reserve(self, rows: int) -> None:
         if rows > len(self._heard):
             self._heard = enlarged(self._heard, max(rows, 2 * len(self._heard)))
@@ -130,6 +138,8 @@ class AnchorWatch:
 
     def _has_moved(self, ways: list[float], hearing: int, alone: bool) -> bool:
         """Return whether an anchor has moved whose ranges made these steps. hearing: tags that hear it."""
+        if not self._judges:
+            return False
         if len(ways) == 1:
             return hearing == 1 and alone and ways[0] < -LEAST_ALONE_M
         if min(ways) > 0.0:

@@ -1,7 +1,7 @@
 """Run the engine so that it follows changes of the sites, and so that a fault of one row harms no other row."""
 
 import logging
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence, Set
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from dropanchor_service.ingest.units import convert, has_units
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.store import ServedSite, Sites
+from dropanchor_service.store.anchor_doubts import AnchorDoubt
 from dropanchor_service.store.records import enlarged
 
 
@@ -164,6 +165,11 @@ class GuardedEngine:
         """Return the id of an anchor, as its site has it."""
         store = self._sites[int(self.anchors.sites[index])].store
         return store.anchors_by_index()[int(self.anchors.own_indices(np.array([index]))[0])].id
+
+    def follow_doubts(self, site: int, doubts: Iterable[AnchorDoubt]) -> None:
+        """Doubt these anchors of a site, and no others, whatever the ranges say."""
+        of_ids = {self._anchor_id(index): index for index in self.anchors.of_site(site)}
+        self._anchor_watch.follow({of_ids[doubt.anchor]: doubt for doubt in doubts if doubt.anchor in of_ids})
 
     def prepare(self, row: int) -> None:
         """Configure a row before its first message arrives, so that the message does not wait for it."""

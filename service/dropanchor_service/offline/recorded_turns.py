@@ -81,6 +81,8 @@ class OfflineService:
         self.clock.t_ns = turn.t_ns
         if turn.site is not None:
             self._adopt(turn.site)
+        if turn.doubts is not None:
+            self.engine.follow_doubts(0, turn.doubts)
         self._ingest.turn()  # releases pending messages that were due before this turn
         for start in range(0, len(turn.messages), MESSAGES_PER_TURN):
             for tag, payload, encoding, arrival_ns in turn.messages[start : start + MESSAGES_PER_TURN]:

@@ -15,6 +15,7 @@ from dropanchor_service.recording.mcap_file import METADATA, PROFILE
 from dropanchor_service.recording.messages import ESTIMATE, SITE_TOPIC
 from dropanchor_service.recording.output import JSON, PACKED
 from dropanchor_service.recording.unpacking import READ_ERRORS, TooLargeError, mcap_records
+from dropanchor_service.store.anchor_doubts import AnchorDoubt
 from dropanchor_service.store.site_values import SiteDocument
 from dropanchor_tag_client.recording import RecordingError
 from dropanchor_tag_client.recording.order import MAX_DISORDER_S, goes_back
@@ -28,13 +29,14 @@ class Turn:
     """One turn of the ingest.
 
     site: the site document if it changed. messages: tag, payload, encoding, UTC of arrival in ns.
-    estimates: tag and fields of each recorded pose, without unknown values.
+    estimates: tag and fields of each recorded pose, without unknown values. doubts: of anchors, if these changed.
     """
 
     t_ns: int
     site: SiteDocument | None = None
     messages: list[tuple[str, bytes, str, int]] = field(default_factory=list)
     estimates: list[tuple[str, Mapping[str, Any]]] = field(default_factory=list)
+    doubts: list[AnchorDoubt] | None = None
 
 
 class RecordingReader:

@@ -8,7 +8,7 @@ import { STATES, stateNumber } from "../data/states.js";
 import { nanoseconds } from "../data/track_reader.js";
 import { differences } from "../data/trail.js";
 import { t, timeText } from "../i18n/language.js";
-import { refusal } from "../i18n/said.js";
+import { refusal, said } from "../i18n/said.js";
 import { partOf } from "../page/parts.js";
 import { WhatIf } from "./what_if.js";
 
@@ -19,6 +19,7 @@ const KINDS = ["anchor", "site", "tag"];
 /** @type {Record<string, string>} */
 const INCIDENTS = { rejected: "then.rejected", clock_jump: "then.clock_jump", restart: "then.restart", missing: "then.missing" };
 
+/** @typedef {import("./what_if.js").Cause} Cause */
 /** @typedef {{t_ns: number, kind: string, reason: string | null, count: number}} Incident @typedef {import("../data/trail.js").Entry} Entry */
 
 export class Then {
@@ -58,11 +59,14 @@ export class Then {
     this.#say(t("then.running"), []);
     try {
       const { pose, past } = await this.#explanation(at_ms);
-      if (asked === this.#asked) this.#say(stateText(pose), [...incidents(past), ...states(past)]);
+      if (asked === this.#asked) this.#say(stateText(pose), [...this.#causes(past), ...incidents(past), ...states(past)]);
     } catch (error) {
       if (asked === this.#asked) this.#say(refusal(error), []);
     }
   }
+
+  /** @param {{causes: Cause[]}} past @returns {(string | Node)[][]} */
+  #causes = ({ causes }) => causes.map((cause) => [said(cause.text, cause.phrase), " ", button(t("whatif.so"), () => this.whatIf.offer(cause))]);
 
   /** @param {number} at_ms */
   async #explanation(at_ms) {
@@ -109,11 +113,15 @@ export class Then {
     }
   }
 
-  /** @param {string} text @param {string[]} lines */
+  /** @param {string} text @param {(string | (string | Node)[])[]} lines */
   #say(text, lines) {
     if (text === "") this.#asked = "";
     partOf(this.box, "answer").textContent = text;
-    partOf(this.box, "lines").replaceChildren(...lines.map((line) => Object.assign(document.createElement("li"), { textContent: line })));
+    partOf(this.box, "lines").replaceChildren(...lines.map((line) => {
+      const item = document.createElement("li");
+      item.append(...[line].flat());
+      return item;
+    }));
     partOf(this.box, "lines").hidden = lines.length === 0;
   }
 }

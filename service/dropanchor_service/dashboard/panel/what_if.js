@@ -15,6 +15,7 @@ const MINUTE_MS = 60_000;
 const MOST_MS = 30 * MINUTE_MS; // that the service runs again
 
 /** @typedef {{id: string, x: number, y: number}} Anchor */
+/** @typedef {{text: string, phrase: import("../i18n/said.js").Phrase, from_ns: number, settings?: {mount_angle_rad: number}, anchor?: string}} Cause as in the contract */
 /** @typedef {{settings?: Record<string, any>, anchors?: Anchor[]}} Other what differs */
 /** @typedef {{t_ns: number[], x: (number | null)[], y: (number | null)[], state: string[]}} Columns */
 
@@ -48,6 +49,16 @@ export class WhatIf {
     const anchors = this.map.anchors.map(({ id }) => new Option(id, id));
     fieldOf(this.form, "anchor").replaceChildren(new Option(t("whatif.as_was"), ""), ...anchors);
     this.#showAnchor();
+  }
+
+  /** Fill in what would have been right, and run it: but where an anchor was moved to, only people know. @param {Cause} cause */
+  offer({ from_ns, settings, anchor }) {
+    writeMeasure(fieldOf(this.form, "mount"), settings?.mount_angle_rad ?? null);
+    fieldOf(this.form, "anchor").value = anchor ?? "";
+    this.#showAnchor();
+    fieldOf(this.form, "minutes").value = ((this.replay.time_ms - from_ns / 1e6) / MINUTE_MS).toFixed(3);
+    if (anchor) fieldOf(this.form, "x").focus();
+    else this.form.requestSubmit();
   }
 
   /** Run the time until the shown one again. @param {Other} other @param {number} from_ms when the tag was right */

@@ -15,6 +15,7 @@ export default {
   "whatif.title": "Was wäre, wenn",
   "whatif.as_was": "wie es war",
   "whatif.not": "Und wenn nicht?",
+  "whatif.so": "Ausprobieren",
   "whatif.minutes": "Minuten vor dieser Zeit, als er noch richtig war",
   "whatif.run": "Damit noch einmal rechnen",
   "whatif.apply": "Jetzt so setzen",

@@ -15,6 +15,7 @@ export default {
   "whatif.title": "What if",
   "whatif.as_was": "as it was",
   "whatif.not": "What if not",
+  "whatif.so": "Try it",
   "whatif.minutes": "Minutes before this time, when it was right",
   "whatif.run": "Run it again with this",
   "whatif.apply": "Set this now",
