@@ -1,9 +1,13 @@
 """`dropanchor doctor`: run through what can be wrong with a service, or with one tag now or at a time that is past."""
 
 import argparse
+import os
+import platform
 import time
 from collections.abc import Iterator, Mapping
 from http import HTTPStatus
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
@@ -11,18 +15,23 @@ from dropanchor_schemas.rejections import REASONS_EXPLAINED, Reason
 from dropanchor_schemas.times import ns_of_parameter
 from dropanchor_service.answers.times import iso_utc
 from dropanchor_service.commands.rest import KEY_VARIABLE, RefusedError, add_rest_options, asked
+from dropanchor_service.runtime.kernel_cache import VARIABLE, state_of
+from dropanchor_service.runtime.written_by import FILE, later_version, of_later, writer_of
+from dropanchor_tag_client.host import VERSION
 
 DESCRIPTION = f"""\
 Runs through what can be wrong, and says of each what it found: of a running service whether it is ready, and what is
 impaired (disk, folder, keys, threads, clock of the machine); with --tag, whether it is the tag (clock, sensors, radio),
 the anchor, the site, the settings (who changed which, and when) or the estimate. With --at it looks at the past, as
-the black box has it. If the service requires an API key, set the environment variable {KEY_VARIABLE}. What a service
-needs before its start tells `dropanchor check`.
+the black box has it. With --data-dir it looks at this machine, too: versions, compiled kernels, and which version
+wrote the folder. If the service requires an API key, set the environment variable {KEY_VARIABLE}. What a service needs
+before its start tells `dropanchor check`.
 Exit code: 0 nothing is wrong, 1 something is, 2 no answer.
 """
 EPILOG = """\
 examples:
   dropanchor doctor
+  dropanchor doctor --data-dir /var/lib/dropanchor
   dropanchor doctor --tag forklift-7
   dropanchor doctor --tag forklift-7 --at 2026-01-30T15:00:00Z
 """
@@ -47,6 +56,7 @@ class Finding(NamedTuple):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_rest_options(parser)
+    parser.add_argument("--data-dir", metavar="FOLDER", type=Path, help="the data folder of a service on this machine")
     parser.add_argument("--site", metavar="ID", help="the site of the tag (default: the only one)")
     parser.add_argument("--tag", metavar="ID", help="what is wrong with this tag")
     parser.add_argument("--at", metavar="TIME", type=ns_of_parameter, help="at this time, ISO 8601 with a time zone")
@@ -54,10 +64,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print what was found. Return 0 if nothing is wrong, else 1. Raises REFUSED if no service answers."""
-    found = [*_of_service(arguments), *(_of_tag(arguments) if arguments.tag else ())]
-    for where, sentence, is_wrong in found:
-        print(f"{'LOOK' if is_wrong else 'good'}  {where}: {sentence}")
-    return EXIT_FOUND if any(one.is_wrong for one in found) else 0
+    found_wrong = False
+    for where, sentence, is_wrong in _findings(arguments):
+        print(f"{'LOOK' if is_wrong else 'good'}  {where}: {sentence}", flush=True)
+        found_wrong |= is_wrong
+    return EXIT_FOUND if found_wrong else 0
+
+
+def _findings(arguments: argparse.Namespace) -> Iterator[Finding]:
+    """Raises RefusedError."""
+    if arguments.data_dir is not None:
+        yield from _of_machine(arguments.data_dir)
+    yield from _of_service(arguments)
+    if arguments.tag:
+        yield from _of_tag(arguments)
+
+
+def _of_machine(folder: Path) -> Iterator[Finding]:
+    versions = ", ".join(f"{name} {version(name)}" for name in ("numba", "numpy", "eclipse-zenoh"))
+    python = f"Python {platform.python_version()}"
+    yield Finding("versions", f"dropanchor {VERSION}, {python}, {versions}", is_wrong=False)
+    sentence, is_ready = state_of(Path(os.environ[VARIABLE]))
+    yield Finding("kernels", sentence, not is_ready)
+    if later_version(folder / FILE) is not None:
+        yield Finding("folder", of_later(folder, "its file `written_by` says so", folder / FILE))
+    elif (writer := writer_of(folder)) is None:
+        yield Finding("folder", f"no version has written into {folder} yet")
+    else:
+        yield Finding("folder", f"version {writer} was the latest to write into {folder}", is_wrong=False)
 
 
 def _of_service(arguments: argparse.Namespace) -> Iterator[Finding]:

@@ -103,6 +103,23 @@ def is_full(folder: Path) -> bool:
     return mark.exists()
 
 
+def state_of(folder: Path) -> tuple[str, bool]:
+    """Return what a cache holds, as a sentence, and whether a start can use it at once. It changes nothing."""
+    if damaged := len(damaged_in(folder)):
+        return (
+            f"{damaged} files in {folder} are damaged: the next start makes them anew, in half a minute or more",
+            False,
+        )
+    if mark_of(folder).exists():
+        return f"{folder} has all of this version", True
+    are_here = "are of another version, Python or processor" if shipped() else "are not installed"
+    return (
+        f"{folder} has not all of this version, and those that come compiled (dropanchor-kernels) {are_here}: the next "
+        "start compiles, for half a minute or more; `dropanchor compile` does so before",
+        False,
+    )
+
+
 def has_room(folder: Path, size: int = ROOM) -> bool:
     """Make the folder if there is none. Return whether so many bytes can be written into it."""
     try:

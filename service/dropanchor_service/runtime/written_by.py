@@ -27,6 +27,11 @@ def mark(folder: Path) -> None:
             write_atomically(folder / FILE, [f"{VERSION}\n".encode()])
 
 
+def writer_of(folder: Path) -> str | None:
+    """Return the latest version that has written into a folder, None if it is not known."""
+    return _read(folder / FILE)
+
+
 def later_version(path: Path) -> str | None:
     """Return the version that has written a file or beside it, None if it is not known or not later than this one."""
     found = next((version for folder in _above(path) if (version := _read(folder / FILE)) is not None), None)

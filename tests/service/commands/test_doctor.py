@@ -4,6 +4,7 @@ import time
 from pathlib import Path
 
 from dropanchor_schemas.wire import ENCODING_JSON
+from dropanchor_service.runtime.written_by import FILE
 from support.commands import Ended
 from support.service import ended
 from support.yard import running_yard
@@ -32,6 +33,15 @@ def test_a_rejection_a_change_of_settings_and_silence_are_found_with_their_times
             ("good  service: its clock is ", " s from that of this machine"),
         ):
             assert [line for line in lines if line.startswith(begin) and end in line], found.stdout
+        found = doctor(yard.url, "--data-dir", str(tmp_path))
+        assert found.returncode == 0, found.stdout
+        looked = ("versions", "kernels", "folder", "service")
+        assert [line.split(":")[0] for line in found.stdout.splitlines()] == [f"good  {where}" for where in looked]
         assert doctor(yard.url, "--tag", "nobody").returncode == 2
         assert "black box holds nothing" in doctor(yard.url, "--tag", TAG, "--at", "2020-01-01T00:00:00Z").stderr
-    assert doctor(f"http://127.0.0.1:{free_port()}").returncode == 2
+    (tmp_path / FILE).write_text("999.0.0")
+    nowhere, empty = f"http://127.0.0.1:{free_port()}", tmp_path / "kernels"
+    found = ended("doctor", "--url", nowhere, "--data-dir", str(tmp_path), NUMBA_CACHE_DIR=str(empty))
+    assert found.returncode == 2
+    assert "LOOK  folder: version 999.0.0 wrote" in found.stdout
+    assert f"LOOK  kernels: {empty} has not all of this version" in found.stdout
