@@ -37,7 +37,7 @@ def count_circles(page: Page) -> None:
 
 
 def check_stamps(page: WatchedPage, place: Place) -> None:
-    """A drawing of a crowd stamps its dots, each where its tag is, and draws a circle for few of them."""
+    """A drawing of many tags stamps its dots, each where its tag is, and draws a circle for few of them."""
     x, y = (values.ravel() for values in np.meshgrid(np.linspace(-13.0, 13, 40), np.linspace(-13.0, 13, 40)))
     crowd = [f"crowd-{number}" for number in range(len(x))]
     for moved in (0.0, 0.2):

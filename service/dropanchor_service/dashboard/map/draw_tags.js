@@ -13,19 +13,22 @@ const RIM_PX = 3;
 /** Dots in a crowd are small: their halo is thin, and their headings have none. */
 const CROWD_RIM_PX = 1.25;
 
+/** More dots are smaller, and stamped. */
+const PATHS_UP_TO = 200;
+
 /** @param {number} count dots on the screen */
-export const markerRadius = (count) => (count <= 200 ? 5.5 : count <= 1500 ? 4 : 3);
+export const markerRadius = (count) => (count <= PATHS_UP_TO ? 5.5 : count <= 1500 ? 4 : 3);
 
 /** @param {number} radius */
 const isCrowd = (radius) => radius < 4;
 
-/** @param {Scene} scene @param {import("./stamps.js").Stamps} stamps for crowds */
+/** @param {Scene} scene @param {import("./stamps.js").Stamps} stamps for many dots */
 export function drawMarkers(scene, stamps) {
   const radius = markerRadius(scene.rows.length);
   for (const group of alike(scene)) {
     const rows = group.rows.filter((row) => !hasGhosts(scene.fleet, row));
     scene.ctx.globalAlpha = 1;
-    if (isCrowd(radius)) stamps.draw(scene, `${group.state} ${group.stale}`, rows, (...place) => paintOne(scene, group, radius, ...place));
+    if (scene.rows.length > PATHS_UP_TO) stamps.draw(scene, `${radius} ${group.state} ${group.stale}`, rows, (...place) => paintOne(scene, group, radius, ...place));
     else paintAlike(scene, group, rows, radius);
   }
   scene.ctx.globalAlpha = 1;

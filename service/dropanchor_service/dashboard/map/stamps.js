@@ -1,7 +1,7 @@
-/** The dots of a crowd with their headings: painted once for each state and direction, then stamped. A path for each tag takes the browser several times as long. */
+/** Many dots with their headings: painted once for each state and direction, then stamped. A path for each tag takes the browser several times as long. */
 
 const DIRECTIONS = 48;
-const SIZE_PX = 20;
+const SIZE_PX = 28;
 
 /** @typedef {(ctx: CanvasRenderingContext2D, heading_rad: number, centre_px: number) => void} Paint */
 
