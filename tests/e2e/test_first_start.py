@@ -1,5 +1,7 @@
 """The first start compiles the estimator. It reports its progress, serves the page meanwhile and can be interrupted."""
 
+import os
+import shutil
 import signal
 import subprocess
 from pathlib import Path
@@ -32,6 +34,8 @@ def test_a_signal_ends_a_first_start_while_it_compiles(tmp_path: Path, subcomman
 
 
 def test_a_first_start_serves_the_page_at_once_and_loses_no_sample(tmp_path: Path) -> None:
+    cache, but_the_decoder = tmp_path / "cache", shutil.ignore_patterns("kernels_*")  # whose compilation takes seconds
+    shutil.copytree(os.environ["NUMBA_CACHE_DIR"], cache, ignore=but_the_decoder)
     url, zenoh = f"http://127.0.0.1:{free_port()}", free_endpoint()
     arguments = command("serve", "--engine", "paper", "--port", url.rpartition(":")[2], "--zenoh-listen", zenoh)
 
@@ -41,9 +45,7 @@ def test_a_first_start_serves_the_page_at_once_and_loses_no_sample(tmp_path: Pat
         except httpx.TransportError:
             return 0
 
-    with subprocess.Popen(
-        arguments, stderr=subprocess.DEVNULL, env=environment(NUMBA_CACHE_DIR=str(tmp_path))
-    ) as process:
+    with subprocess.Popen(arguments, stderr=subprocess.DEVNULL, env=environment(NUMBA_CACHE_DIR=str(cache))) as process:
         try:
             wait_until(lambda: status("/") == 200)
             wait_until(lambda: "so far" in httpx.get(f"{url}/api/v1/health/ready", trust_env=False, verify=False).text)

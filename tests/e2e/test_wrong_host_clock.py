@@ -12,7 +12,7 @@ from support.service import Running, running_service
 from support.zenoh_router import free_endpoint, router_process, wait_until
 
 HOUR_S = 3600.0
-LIVES_S = (0.0, 5 * HOUR_S, -3 * HOUR_S, 24 * HOUR_S, 0.0)
+LIVES_S = (0.0, 24 * HOUR_S, -3 * HOUR_S, 0.0)
 TAGS, SEED = 3, 1
 NEAR_S = 60.0
 WRITTEN = 'dropanchor_checkpoints_total{outcome="written"}'
