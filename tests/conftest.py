@@ -6,6 +6,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
@@ -14,6 +15,11 @@ from support.kernel_cache import use_cache_of_these_sources
 from support.outside import is_left_out, is_long, is_outside
 from support.patience import be_patient_with_http
 from support.zenoh_router import free_endpoint, running_router
+
+if TYPE_CHECKING:  # tests without a page need no Playwright
+    from playwright.sync_api import Browser
+
+    from support.browser import PausedBrowser
 
 use_cache_of_these_sources()
 be_patient_with_http()
@@ -68,6 +74,24 @@ def pytest_collection_finish() -> None:
 def _rank(item: pytest.Item) -> int:
     folder = item.path.relative_to(item.config.rootpath / "tests").parts[0]
     return FIRST.index(folder) if folder in FIRST else len(FIRST)
+
+
+@pytest.fixture(scope="session")
+def shared_chromium() -> Iterator["PausedBrowser"]:
+    """Return the browser of this worker, which a test drives in a block."""
+    from support.browser import PausedBrowser, running_chromium
+
+    with running_chromium() as browser:
+        paused = PausedBrowser(browser)
+        with paused.paused():
+            yield paused
+
+
+@pytest.fixture(scope="module")
+def chromium(shared_chromium: "PausedBrowser") -> Iterator["Browser"]:
+    """Return the browser of this worker, for a file whose tests run no event loop."""
+    with shared_chromium.driven() as browser:
+        yield browser
 
 
 @pytest.fixture

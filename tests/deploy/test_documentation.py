@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import expect
 
 from dropanchor_service.api.help.documents import FOLDER, documents
-from support.browser import open_page, running_chromium
+from support.browser import PausedBrowser, open_page
 from support.service import ROOT, environment
 
 
@@ -58,8 +58,8 @@ def test_the_site_has_every_page(site: Path) -> None:
 
 
 @pytest.mark.browser
-def test_the_site_is_searched_without_another_server(address: str) -> None:
-    with running_chromium() as browser, open_page(browser, f"{address}/tutorial.html") as page:
+def test_the_site_is_searched_without_another_server(address: str, shared_chromium: PausedBrowser) -> None:
+    with shared_chromium.driven() as browser, open_page(browser, f"{address}/tutorial.html") as page:
         expect(page.page.locator(".md-nav--primary")).to_contain_text("How-to guides")
         page.page.get_by_role("textbox", name="Search").press_sequentially("floor plan")  # it listens to keys
         found = page.page.locator(".md-search-result__link", has_text="Show a floor plan").first

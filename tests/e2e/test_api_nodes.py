@@ -16,7 +16,7 @@ from dropanchor_service.cluster import leases
 from dropanchor_service.cluster.database import connect
 from dropanchor_service.node.owners import HOLD_S
 from dropanchor_tag_client import TagClient
-from support.browser import open_page, running_chromium
+from support.browser import PausedBrowser, open_page
 from support.patience import PATIENCE_S
 from support.postgresql import Postgresql, needs_postgresql, running_postgresql
 from support.repeated import repeated
@@ -150,9 +150,11 @@ def test_two_nodes_show_all_sites_through_a_move_a_death_and_an_outage_of_the_da
 
 
 @pytest.mark.browser
-def test_the_page_of_a_node_leads_from_the_overview_to_a_moving_dot(cluster: Cluster) -> None:
+def test_the_page_of_a_node_leads_from_the_overview_to_a_moving_dot(
+    cluster: Cluster, shared_chromium: PausedBrowser
+) -> None:
     with ExitStack() as opened:
-        browser = opened.enter_context(running_chromium())
+        browser = opened.enter_context(shared_chromium.driven())
         opened.enter_context(driving_carts(cluster, "019.north"))
         node = cluster.nodes[0]
         watched = opened.enter_context(open_page(browser, f"{node.url}/"))

@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import expect
 from websockets.sync.client import connect
 
-from support.browser import running_chromium
+from support.browser import PausedBrowser
 from support.patience import PATIENCE_S
 from support.proxies import caddy, nginx, of_guide
 from support.service import ended, running_service
@@ -88,8 +88,10 @@ def test_every_way_in_stays_below_the_path(proxied: Proxied) -> None:
 
 
 @pytest.mark.browser
-def test_what_is_tried_in_the_documentation_goes_below_the_path(proxied: Proxied) -> None:
-    with running_chromium() as browser, browser.new_context(ignore_https_errors=True) as context:
+def test_what_is_tried_in_the_documentation_goes_below_the_path(
+    proxied: Proxied, shared_chromium: PausedBrowser
+) -> None:
+    with shared_chromium.driven() as browser, browser.new_context(ignore_https_errors=True) as context:
         context.set_default_timeout(1000 * PATIENCE_S)
         page, asked = context.new_page(), list[str]()
         page.on("request", lambda request: asked.append(request.url))

@@ -5,17 +5,17 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Browser, expect
 
-from support.browser import running_chromium, watched_page
+from support.browser import watched_page
 from support.service import running_service
 from support.zenoh_router import wait_until
 
 pytestmark = pytest.mark.browser
 
 
-def test_six_simulated_tags_come_at_a_button_and_go_with_undo_or_the_service() -> None:
-    with running_service() as service, running_chromium() as browser, watched_page(browser, f"{service.url}/") as page:
+def test_six_simulated_tags_come_at_a_button_and_go_with_undo_or_the_service(chromium: Browser) -> None:
+    with running_service() as service, watched_page(chromium, f"{service.url}/") as page:
         page.page.get_by_role("button", name="Simulate six tags").click()
         expect(page.page.locator("#empty")).to_be_hidden()
         page.wait_for("dropanchor.tags().filter(({ state }) => state === 'tracking').length === 6")

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 from dropanchor_tag_client import TagClient
-from support.browser import WatchedPage, running_chromium, watched_page
+from support.browser import WatchedPage, watched_page
 from support.patience import PATIENCE_S
 from support.repeated import repeated
 from support.service import running_service
@@ -27,12 +27,6 @@ id = "7"
 [tags.cart]
 start = { x = 7.5, y = 1.0, heading_rad = 1.570796 }
 """
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
-    with running_chromium() as browser:
-        yield browser
 
 
 @contextmanager

@@ -7,10 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser
 
 from dropanchor_schemas.wire import ENCODING_JSON, Frame, RangeSample, encode_json
 from dropanchor_service.cli import main
-from support.browser import running_chromium
 from support.repeated import repeated
 from support.service import Running, running_service, settings_file
 from support.tag_page import tag_page
@@ -41,7 +41,9 @@ def ranges_from_elsewhere(service: Running, key: str) -> Iterator[None]:
         yield
 
 
-def test_a_phone_that_opens_the_link_of_its_key_has_a_pose(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_phone_that_opens_the_link_of_its_key_has_a_pose(
+    chromium: Browser, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     security, port, http_port = tmp_path / "security", free_port(), free_port()
 
     def run(*words: str) -> tuple[str, str]:
@@ -55,7 +57,7 @@ def test_a_phone_that_opens_the_link_of_its_key_has_a_pose(tmp_path: Path, capsy
     gateway, reader = run("key", "add", "gateway", "--tag", "anna")[0], run("key", "add", "reader")[0]
     options = ("--security", str(security), "--zenoh-listen", f"tls/127.0.0.1:{port}", "--log-level", "DEBUG")
     config = ("--config", str(settings_file(tmp_path, ["anna"])), "--port", str(http_port))
-    with running_service(*options, *config, ca=security / "ca.pem") as service, running_chromium() as chromium:
+    with running_service(*options, *config, ca=security / "ca.pem") as service:
         with tag_page(chromium, link, ignore_https_errors=True) as page, ranges_from_elsewhere(service, gateway):
             page.start()
             page.move(shake=0.8)

@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 from dropanchor_schemas.site import Anchor
 from dropanchor_service.store import SiteStore
 from dropanchor_tag_client.simulator.live import simulation
-from support.browser import running_chromium, watched_page
+from support.browser import watched_page
 from support.scripted_past import MODELS, Script, write_past
 from support.service import Running, running_service
 
@@ -24,12 +24,6 @@ AT_S, MOVED_S, CORRECTED_S, END_S = 30.0, 60.0, 75.0, 80.0
 AWAY_X = 8.0
 MOST_CLICKS = 5
 MOUNT, ANCHOR = "mount_angle_rad: null → 1.57", "x: 0 → 25"
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
-    with running_chromium() as browser:
-        yield browser
 
 
 def mount_otherwise(site: SiteStore) -> None:

@@ -1,31 +1,15 @@
-"""A browser, and a page whose store the test fills."""
+"""A page whose store the test fills."""
 
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser
 
 from dropanchor_service.api.app import DASHBOARD
 from service.dashboard.past_place import past_place
 from service.dashboard.place import Place, live_api_bench
 from support.axe import axe_source
-from support.browser import PausedBrowser, running_chromium
 from support.http_server import running_server
-
-
-@pytest.fixture(scope="session")
-def shared_chromium() -> Iterator[PausedBrowser]:
-    with running_chromium() as browser:
-        paused = PausedBrowser(browser)
-        with paused.paused():
-            yield paused
-
-
-@pytest.fixture(scope="module")
-def chromium(shared_chromium: PausedBrowser) -> Iterator[Browser]:
-    with shared_chromium.driven() as browser:
-        yield browser
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ FILES = dict(re.findall(r'^const ([A-Z]+) = "([^"]+)";$', SOURCE, re.MULTILINE))
 TARGETS = re.findall(r'^  (\w+): (?:([A-Z]+)(?: \+ )?)?(?:"([^"]*)")?,$', SOURCE, re.MULTILINE)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def site() -> Iterator[ZonePlace]:
     with set_up_place() as place:
         yield place
