@@ -82,6 +82,7 @@ export function valueOf(field) {
   if (field.type === "number" && field.value === "") return JSON.parse(empty);
   if (measure) return readMeasure(input);
   if (field.type === "number") return input.valueAsNumber;
-  if (as === "list") return field.value.split(/[\s,]+/).filter((part) => part !== "");
+  if (as === "ids") return field.value.split(/[\s,]+/).filter((part) => part !== "");
+  if (as === "labels") return field.value.trim().split(/\s*,\s*/).filter((part) => part !== "");
   return as === "secret" && field.value === "" ? null : field.value.trim();
 }

@@ -1,13 +1,15 @@
 /** The form of the zone that is being edited. */
 
 import { t } from "../i18n/language.js";
-import { readMeasure, writeMeasure } from "../data/units.js";
+import { fill, valueOf } from "../page/model_fields.js";
 import { fieldOf, partOf, writeOrHide } from "../page/parts.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone */
 
-const SEVERITIES = /** @type {const} */ (["enter_severity", "dwell_severity", "speed_severity"]);
-const MEASURES = /** @type {const} */ (["speed_mps", "z_min_m", "z_max_m"]);
+const FIELDS = /** @type {const} */ ([
+  "name", "colour", "enter", "exit", "dwell_s", "delay_s", "tags", "groups", "enter_severity", "dwell_severity", "speed_severity",
+  "speed_mps", "z_min_m", "z_max_m",
+]);
 
 export class ZoneForm {
   #shown = "";
@@ -56,39 +58,23 @@ export class ZoneForm {
     partOf(this.form, "radius").hidden = !isCircle;
     partOf(this.form, "corner").hidden = isCircle;
     partOf(this.form, "delete").hidden = this.editor.isNew || !this.editor.store.isAdmin;
-    for (const name of /** @type {const} */ (["enter", "exit"])) fieldOf(this.form, name).checked = zone[name];
-    for (const name of /** @type {const} */ (["tags", "groups"])) this.#fill(name, zone[name].join(", "));
-    for (const name of /** @type {const} */ (["name", "colour", "dwell_s", "delay_s", ...SEVERITIES])) this.#fill(name, String(zone[name] ?? ""));
     fieldOf(this.form, "radius_m").disabled = !isCircle;
-    this.#measure("radius_m", isCircle ? shape.radius_m : null);
-    for (const name of MEASURES) this.#measure(name, zone[name]);
+    this.#fill("radius_m", isCircle ? shape.radius_m : null);
+    for (const name of FIELDS) this.#fill(name, zone[name]);
   }
 
-  /** Write a value, but not over what is being typed. @param {string} name @param {string} value */
+  /** Write a value, but not over what is being typed. @param {string} name @param {any} value */
   #fill(name, value) {
     const field = fieldOf(this.form, name);
-    if ((field !== document.activeElement || this.#isFresh) && field.value !== value) field.value = value;
-  }
-
-  /** @param {string} name @param {number | null} value in SI units */
-  #measure(name, value) {
-    if (fieldOf(this.form, name) !== document.activeElement || this.#isFresh) writeMeasure(fieldOf(this.form, name), value);
+    if (field !== document.activeElement || this.#isFresh) fill(field, value);
   }
 
   /** @returns {Partial<Zone>} */
   #values() {
-    const number = (/** @type {string} */ name) => (fieldOf(this.form, name).value === "" ? null : fieldOf(this.form, name).valueAsNumber);
-    const list = (/** @type {string} */ name, /** @type {RegExp} */ separator) =>
-      fieldOf(this.form, name).value.trim().split(separator).filter((part) => part !== "");
-    const shape = /** @type {Zone} */ (this.editor.zone).shape;
-    const radius_m = readMeasure(fieldOf(this.form, "radius_m"));
+    const { shape } = /** @type {Zone} */ (this.editor.zone);
+    const radius_m = valueOf(fieldOf(this.form, "radius_m"));
     return {
-      name: fieldOf(this.form, "name").value, colour: fieldOf(this.form, "colour").value,
-      enter: fieldOf(this.form, "enter").checked, exit: fieldOf(this.form, "exit").checked,
-      ...Object.fromEntries(SEVERITIES.map((name) => [name, fieldOf(this.form, name).value])),
-      dwell_s: number("dwell_s"), delay_s: number("delay_s") ?? 1,
-      ...Object.fromEntries(MEASURES.map((name) => [name, readMeasure(fieldOf(this.form, name))])),
-      tags: list("tags", /[\s,]+/), groups: list("groups", /\s*,\s*/),
+      ...Object.fromEntries(FIELDS.map((name) => [name, valueOf(fieldOf(this.form, name))])),
       shape: shape.type === "circle" && radius_m !== null ? { ...shape, radius_m } : shape,
     };
   }
