@@ -201,7 +201,12 @@ def test_rules_are_made_and_edited_and_those_of_zones_lead_to_the_zone(chromium:
         expect(alerts.get_by_role("list", name="Rules")).to_contain_text("Closer than 2.5 m")
         made = place.parts.items.rules.all["keep-apart"]
         assert isinstance(made, TooCloseRule)
-        assert (made.distance_m, made.delay_s, made.groups, made.name) == (2.5, 1.0, ["forklifts", "hall 3"], "Keep apart")
+        assert (made.distance_m, made.delay_s, made.groups, made.name) == (
+            2.5,
+            1.0,
+            ["forklifts", "hall 3"],
+            "Keep apart",
+        )
         alerts.get_by_role("button", name="New: Battery low").click()
         expect(form.get_by_label("Closer than")).to_be_hidden()
         form.get_by_label("Name").fill("Charge")
