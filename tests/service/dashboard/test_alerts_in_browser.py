@@ -89,7 +89,7 @@ def test_a_webhook_needs_no_terminal_its_secret_is_made_and_its_network_allowed_
         secret = form.get_by_role("textbox", name="Secret").input_value()
         key_of(secret)
         form.get_by_role("button", name="Copy").click()
-        assert page.page.evaluate("navigator.clipboard.readText()") == secret
+        page.wait_for(f"navigator.clipboard.readText().then((text) => text === {secret!r})")
         form.get_by_role("button", name="New secret").click()
         assert form.get_by_role("textbox", name="Secret").input_value() != secret
         form.get_by_role("textbox", name="Secret").fill("")

@@ -19,6 +19,15 @@ from support.tag_page_service import Service
 pytestmark = pytest.mark.browser
 
 SECOND = 1_000_000_000
+STORED = """new Promise((resolve) => {
+    const asked = indexedDB.open("dropanchor-tag-anna");
+    asked.onsuccess = () => {
+        const found = asked.result.transaction("messages").objectStore("messages").getAll();
+        asked.result.close();
+        found.onsuccess = () => resolve(found.result.reduce((sum, { samples }) => sum + samples, 0));
+    };
+})"""
+"""The samples that the page has stored."""
 
 
 @pytest.fixture
@@ -129,7 +138,9 @@ def test_what_waits_survives_a_reload_of_the_page(chromium: Browser, service: Se
             page.wait_for("counts.sent > 30")
         page.wait_for("counts.waiting > 60")
         page.rest()
-        page.page.wait_for_timeout(1500)  # the page stores what waits every second
+        page.wait_for(
+            f"counts.sent + counts.waiting === counts.taken && {STORED}.then((all) => all === counts.waiting)"
+        )
         taken = page.counts()["taken"]
         with service.running():
             page.page.reload()
