@@ -88,6 +88,7 @@ def test_every_way_in_stays_below_the_path(proxied: Proxied) -> None:
 
 
 @pytest.mark.browser
+@pytest.mark.parametrize("proxied", [nginx], ids=["nginx"], indirect=True)  # the page knows no proxy, and takes seconds
 def test_what_is_tried_in_the_documentation_goes_below_the_path(
     proxied: Proxied, shared_chromium: PausedBrowser
 ) -> None:
