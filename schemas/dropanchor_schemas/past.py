@@ -59,7 +59,7 @@ class Cause(Frozen):
     text: str
     phrase: Phrase = Field(description="That sentence by its code.")
     from_ns: int = Field(description="UTC, ns: shortly before it began, for a run with what is told below.")
-    settings: TagSettings = Field(default=TagSettings(), description="Settings that would have been right since.")
+    mount_angle_rad: float | None = Field(default=None, description="The mounting angle that was right since.")
     anchor: str | None = Field(default=None, description="The anchor that was moved. Only people know where to.")
 
 

@@ -28,7 +28,7 @@ def _of_mounting(run: Rerun) -> Iterator[dict[str, Any]]:
         imu, told = run.imu(), run.settings.mount_angle_rad
         if (turn := turned(imu["arrival_ns"], imu["acc"], imu["gyro"], told)) is not None:
             since_ns = run.begin_ns if turn.t_ns is None else turn.t_ns - JUST_BEFORE_NS
-            yield _cause(_of_turn(turn), since_ns) | {"settings": {"mount_angle_rad": round(turn.after, 2)}}
+            yield _cause(_of_turn(turn), since_ns) | {"mount_angle_rad": round(turn.after, 2)}
 
 
 def _cause(text: Sentence, from_ns: int) -> dict[str, Any]:

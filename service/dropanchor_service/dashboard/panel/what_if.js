@@ -15,7 +15,7 @@ const MINUTE_MS = 60_000;
 const MOST_MS = 30 * MINUTE_MS; // that the service runs again
 
 /** @typedef {{id: string, x: number, y: number}} Anchor */
-/** @typedef {{text: string, phrase: import("../i18n/said.js").Phrase, from_ns: number, settings?: {mount_angle_rad: number}, anchor?: string}} Cause as in the contract */
+/** @typedef {{text: string, phrase: import("../i18n/said.js").Phrase, from_ns: number, mount_angle_rad?: number, anchor?: string}} Cause as in the contract */
 /** @typedef {{settings?: Record<string, any>, anchors?: Anchor[]}} Other what differs */
 /** @typedef {{t_ns: number[], x: (number | null)[], y: (number | null)[], state: string[]}} Columns */
 
@@ -52,8 +52,8 @@ export class WhatIf {
   }
 
   /** Fill in what would have been right, and run it: but where an anchor was moved to, only people know. @param {Cause} cause */
-  offer({ from_ns, settings, anchor }) {
-    writeMeasure(fieldOf(this.form, "mount"), settings?.mount_angle_rad ?? null);
+  offer({ from_ns, mount_angle_rad, anchor }) {
+    writeMeasure(fieldOf(this.form, "mount"), mount_angle_rad ?? null);
     fieldOf(this.form, "anchor").value = anchor ?? "";
     this.#showAnchor();
     fieldOf(this.form, "minutes").value = ((this.replay.time_ms - from_ns / 1e6) / MINUTE_MS).toFixed(3);
