@@ -17,6 +17,12 @@ def cpu_s(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) * _TICK_S
 
 
+def children_cpu_s(pid: int) -> float:
+    """Return the user and system time of the children of a process that have ended, in s."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[13]) + int(fields[14])) * _TICK_S
+
+
 def thread_s(pid: int) -> float:
     """Return the time that the threads of a process which live now have run, in s: finer than ticks."""
     files = Path(f"/proc/{pid}/task").glob("*/schedstat")

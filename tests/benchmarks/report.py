@@ -11,6 +11,7 @@ _PAGE_OF = {**dict.fromkeys(("cluster", "hosts", "shard"), PAGES / "cluster.md")
 _WHOLE = ("estimation/fleet", "ingest", "zenoh_io")
 _CLUSTER = ("cluster", "shards", "ownership")
 SOURCES = {
+    "blackbox": ("blackbox", "offline", *_WHOLE),
     "bursts": _WHOLE,
     "capacity": _WHOLE,
     "cluster": _CLUSTER,
