@@ -27,8 +27,7 @@ def _of_mounting(run: Rerun) -> Iterator[dict[str, Any]]:
     if run.settings.motion != "carried":
         imu, told = run.imu(), run.settings.mount_angle_rad
         if (turn := turned(imu["arrival_ns"], imu["acc"], imu["gyro"], told)) is not None:
-            since_ns = run.begin_ns if turn.t_ns is None else turn.t_ns - JUST_BEFORE_NS
-            yield _cause(_of_turn(turn), since_ns) | {"mount_angle_rad": round(turn.after, 2)}
+            yield _cause(_of_turn(turn), turn.t_ns - JUST_BEFORE_NS) | {"mount_angle_rad": round(turn.after, 2)}
 
 
 def _cause(text: Sentence, from_ns: int) -> dict[str, Any]:
@@ -37,13 +36,6 @@ def _cause(text: Sentence, from_ns: int) -> dict[str, Any]:
 
 def _of_turn(turn: Turned) -> Sentence:
     before, after = (f"{math.degrees(angle):.0f}" for angle in (turn.before, turn.after))
-    if turn.t_ns is None:
-        return say(
-            "tag_mounted",
-            "Its bends show a mounting angle of {after}°, and {before}° is set.",
-            before=before,
-            after=after,
-        )
     return say(
         "tag_turned",
         "The tag was turned on what carries it at {time} UTC: its bends show a mounting angle of {before}° before, and "

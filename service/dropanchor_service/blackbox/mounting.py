@@ -13,17 +13,18 @@ import numpy as np
 from dropanchor_service.estimation.columns import Array
 
 BLOCK_S: Final = 0.2  # s, over which vibration cancels out
-LEAST_TURN, MOST_TURN = 0.8, math.pi - 0.8  # rad, of the mounting angle
+LEAST_TURN, MOST_TURN = 1.2, math.pi - 0.8  # rad, of the mounting angle
+AS_TOLD: Final = 0.5  # rad, by which it may have differed before: bends of what slips or rolls point elsewhere
 LEAST: Final = 0.5  # m/s² · rad/s · s, of bends before and after
-COHERENT: Final = 0.7  # share of the accelerations in bends that point the same way
+COHERENT: Final = 0.85  # share of the accelerations in bends that point the same way
 NEARLY: Final = 0.98  # of the best moment to divide at: no bend was driven in between
 TURN: Final = np.ones(5)  # blocks, about as long as somebody turns a tag
 
 
 class Turned(NamedTuple):
-    """t_ns: about when; None if all samples contradict the told mounting. before, after: mounting angles, rad."""
+    """t_ns: about when. before, after: mounting angles, rad: course minus body yaw."""
 
-    t_ns: int | None
+    t_ns: int
     before: float
     after: float
 
@@ -44,12 +45,10 @@ def turned(t_ns: Array, acc: Array, gyro: Array, told: float | None) -> Turned |
     place = int(np.argmax(scores))
     if _tells(sums[place], lengths[place]) and _tells(after[place], left[place]):
         angles = _mount_of(sums[place]), _mount_of(after[place])
-        if _differ(*angles):
+        if _differ(*angles) and (told is None or abs(_wrapped(angles[0] - told)) < AS_TOLD):
             sign = np.sign(_wrapped(angles[0] - angles[1]))  # of the body's turn, against an unchanged course
             when = np.where(scores >= NEARLY * scores.max(), np.convolve(sign * rate, TURN, "same"), -np.inf)
             return Turned(int(t_ns[int(np.argmax(when)) * size]), *angles)
-    if told is not None and _tells(sums[-1], lengths[-1]) and _differ(told, _mount_of(sums[-1])):
-        return Turned(None, told, _mount_of(sums[-1]))
     return None
 
 

@@ -74,7 +74,6 @@ export default {
   "say.anchor_doubted": "Ein Anker scheint anderswo zu stehen: Geben Sie seinen Ort an, oder speichern Sie ihn erneut, um den Ort zu bestätigen.",
   "say.anchor_moved": "Anker {anchor} scheint um {time} UTC um {way} m oder mehr versetzt worden zu sein: Geben Sie seinen Ort an, oder speichern Sie ihn erneut, um den Ort zu bestätigen.",
   "say.tag_turned": "Der Tag wurde um {time} UTC auf dem, was ihn trägt, gedreht: Seine Kurven zeigen davor einen Einbauwinkel von {before}° und seither einen von {after}°.",
-  "say.tag_mounted": "Seine Kurven zeigen einen Einbauwinkel von {after}°, und {before}° ist eingestellt.",
   "say.anchor_misplaced": "Anker {anchor} oder ein anderer, den seine Tags hören, scheint etwa {way} m neben dem Ort zu stehen, den der Standort angibt: Messen Sie die Orte nach, oder speichern Sie ihn erneut, um seinen Ort zu bestätigen.",
   "say.front_or_back": "Das Tag ist vielleicht hinter dem Anker: Drehen Sie einmal nach links und nach rechts, oder setzen Sie `mirrors_behind` des Ankers auf false, wenn nie eines dahinter ist.",
   "say.sensor_fault": "Ein Sensor dieses Tags hat seine Prüfung nicht bestanden: siehe, was der Tag braucht.",
