@@ -16,6 +16,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Row,
     V,
 )
+from dropanchor_service.estimation.fleet.belief.start import starts_at_place
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
@@ -124,10 +125,15 @@ def is_mounted_otherwise(a: Hypothesis, b: Hypothesis) -> bool:
 
 @njit(nogil=True)
 def max_hypotheses(row: Row, t: Tuning) -> int:
-    """Return how many hypotheses the row may have now. A carried tag has fewer, whose ellipse is widened instead."""
-    if row.publication.resolved == 1:
-        return MAX_HYPOTHESES if row.walk.carried == 0 else t.walk_hypotheses
-    return t.coarse_hypotheses if row.start.coarse == 1 else MAX_HYPOTHESES
+    """Return how many hypotheses the row may have now: most while it may be anywhere around the anchor.
+
+    A carried tag has fewest, and its ellipse is widened instead.
+    """
+    if row.publication.resolved == 1 and row.walk.carried == 1:
+        return t.walk_hypotheses
+    if row.publication.resolved == 0 and row.start.coarse == 1:
+        return t.coarse_hypotheses
+    return MAX_HYPOTHESES // 2 if row.publication.resolved == 1 or starts_at_place(row) else MAX_HYPOTHESES
 
 
 @njit(nogil=True)

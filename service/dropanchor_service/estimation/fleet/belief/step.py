@@ -151,7 +151,10 @@ def _reduce_mixture(work: Hypotheses, count: int, row: Row, node: Node, t: Tunin
             distance = t.merge_distance if node.rest == MOVING else t.merge_distance_at_rest
             count = merge(work, count, distance, t.merge_light)
         count = split(work, count, row, node, t)
-        count = keep_heaviest(work, count, max_hypotheses(row, t))
+        most = max_hypotheses(row, t)
+        if count > most:  # light hypotheses that are dropped make the others too certain: merge what is near first
+            count = merge(work, count, t.merge_distance_at_rest, t.merge_light)
+        count = keep_heaviest(work, count, most)
     if row.since_class_check_s >= CHECK_CLASSES_EVERY and uses_heading(row, node):
         row.since_class_check_s = 0.0
         count = try_own_error_again(work, count, row, t)

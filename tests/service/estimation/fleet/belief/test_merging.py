@@ -3,10 +3,14 @@
 from typing import Any
 
 import numpy as np
+import pytest
 
-from dropanchor_service.estimation.fleet.belief.layout import PHI, N, R
-from dropanchor_service.estimation.fleet.belief.mixture import merge, normalise
+from dropanchor_service.estimation.fleet.belief.layout import PHI, ROW, N, R
+from dropanchor_service.estimation.fleet.belief.mixture import max_hypotheses, merge, normalise
+from dropanchor_service.estimation.fleet.belief.step import REDUCE_EVERY, _reduce_mixture
 from dropanchor_service.estimation.fleet.belief.workspace import make_workspace
+from dropanchor_service.estimation.fleet.tuning import Tuning
+from support.belief import node_of
 
 STD = 0.2  # m, of the distance
 
@@ -39,3 +43,18 @@ def test_what_is_merged_keeps_weight_mean_and_variance_of_the_two() -> None:
     assert np.isclose(work["log_weight"][0], 0.0)
     assert np.isclose(work["mean"][0, R], 10.0 + share * 0.7 * STD)
     assert np.isclose(work["cov"][0, R, R], STD**2 + share * (1.0 - share) * (0.7 * STD) ** 2)
+
+
+def test_too_many_are_merged_and_not_dropped_so_that_they_stay_as_uncertain_as_they_were() -> None:
+    row, work, count = np.zeros(1, ROW)[0], make_workspace()["hypotheses"][0], 120
+    row["start"]["known"], row["since_reduction_s"] = 1, REDUCE_EVERY
+    work["mean"][:count, R] = 50.0 + 0.8 * STD * np.arange(count)
+    work["cov"][:count] = np.diag(np.full(N, 1e-6))
+    work["cov"][:count, R, R] = STD**2
+    before = work["mean"][:count, R].var() + STD**2
+    count = _reduce_mixture(work, count, row, node_of(), Tuning().record()[0])
+    normalise(work, count)
+    weight, r = np.exp(work["log_weight"][:count]), work["mean"][:count, R]
+    after = weight @ (work["cov"][:count, R, R] + (r - weight @ r) ** 2)
+    assert count <= max_hypotheses(row, Tuning().record()[0]) < 120
+    assert after == pytest.approx(before, rel=0.01)
