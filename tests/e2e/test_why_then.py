@@ -115,6 +115,15 @@ def test_a_change_is_found_and_tried_without_and_taken_back_and_that_undone(
     assert settings_of(service) == before
 
 
+def test_a_place_that_would_have_been_known_is_told_where_the_one_as_it_was_is_not(person: Person, t0_ns: int) -> None:
+    known = {"t_ns": [t0_ns], "x": [1.0], "y": [2.0], "state": ["tracking"]}
+    person.page.route("**/what-if", lambda route: route.fulfill(json={"apart_m": None, "what_if": known}))
+    person.go_to(UNTOUCHED, t0_ns + round((END_S - 1) * S))
+    line = person.page.locator("#then [data-part=changes] li", has_text=ANCHOR)
+    person.click(line.get_by_role("button", name="What if not"))
+    expect(person.page.locator("#then form [data-part=answer]")).to_contain_text("it would have been at 1.00, 2.00 m.")
+
+
 def settings_of(service: Running) -> tuple[Any, Any]:
     return service.get(f"/api/v1/tags/{SET}/settings"), service.get("/api/v1/anchors/1")
 

@@ -118,10 +118,15 @@ const wordsOf = (other) => [
   ...(other?.anchors ?? []).map(({ id, x, y }) => `${id}: ${place(x, y, 2)}`),
 ].join(", ");
 
-/** @param {Other} other @param {{apart_m: number | null, what_if: Columns}} answer */
+/**
+ * The place as it was may be unknown where the other one is known.
+ * @param {Other} other @param {{apart_m: number | null, what_if: Columns}} answer
+ */
 function sentenceOf(other, { apart_m, what_if: { x, y } }) {
-  if (apart_m === null) return t("whatif.unknown", { what: wordsOf(other) });
-  return t("whatif.would", { what: wordsOf(other), place: place(/** @type {number} */ (x.at(-1)), /** @type {number} */ (y.at(-1)), 2), apart: length(apart_m) });
+  const [what, last_x, last_y] = [wordsOf(other), x.at(-1) ?? null, y.at(-1) ?? null];
+  if (last_x === null || last_y === null) return t("whatif.unknown", { what });
+  const at = place(last_x, last_y, 2);
+  return apart_m === null ? t("whatif.at", { what, place: at }) : t("whatif.would", { what, place: at, apart: length(apart_m) });
 }
 
 /** @param {Columns} columns @returns {import("../map/draw_track.js").Line} */

@@ -20,6 +20,7 @@ export default {
   "whatif.run": "Damit noch einmal rechnen",
   "whatif.apply": "Jetzt so setzen",
   "whatif.would": "Mit {what} wäre er bei {place} gewesen, {apart} von dort.",
+  "whatif.at": "Mit {what} wäre er bei {place} gewesen.",
   "whatif.unknown": "Mit {what} wäre sein Ort nicht bekannt gewesen.",
   "whatif.applied": "{what} wurde gesetzt.",
   "trail.title": "Einstellungen und Änderungen",

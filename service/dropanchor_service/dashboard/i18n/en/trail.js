@@ -20,6 +20,7 @@ export default {
   "whatif.run": "Run it again with this",
   "whatif.apply": "Set this now",
   "whatif.would": "With {what} it would have been at {place}, {apart} from there.",
+  "whatif.at": "With {what} it would have been at {place}.",
   "whatif.unknown": "With {what} its place would not have been known.",
   "whatif.applied": "{what} was set.",
   "trail.title": "Settings and changes",
