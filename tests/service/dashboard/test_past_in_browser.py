@@ -49,7 +49,9 @@ def test_a_link_leads_to_a_moment_of_the_past_and_back_to_the_present(
         expect(lane).to_contain_text(re.compile(r"Tracked 9\d %, at no known place \d %"))
         expect(lane).to_contain_text("0 stops of a minute or more")
         expect(lane.locator("path[data-state='lost']")).to_have_count(1)
-        mark = page.page.locator("tr[data-tag='second'] .c-tag").evaluate("one => one.style.getPropertyValue('--mark')")
+        marked = page.page.locator("tr[data-tag='second'] .c-tag")
+        expect(marked).to_have_attribute("style", re.compile("--mark: *#"))  # the row is drawn after the lane
+        mark = marked.evaluate("one => one.style.getPropertyValue('--mark')")
         colour = f"rgb({', '.join(str(int(mark[at : at + 2], 16)) for at in (1, 3, 5))})"
         expect(lane.locator("path.estimate").first).to_have_css("stroke", colour)
         page.page.goto(link_to(place, end_ns, 155, tag="first"))
