@@ -1,14 +1,19 @@
 /** The values in the address of the page: those after `#`, which no server sees, and before them those after `?`. */
 
-/** The hash that the page read or wrote last. A link that a person follows changes the hash before the page hears of it. */
-let known = "";
+/** The hash that the page shows or wrote last. A link that a person follows changes the hash before the page hears of it. */
+let known = globalThis.location?.hash ?? "";
 
 export const isAddressRead = () => location.hash === known;
+
+/** Return the values that the page shows from now on. */
+export function readAddress() {
+  known = location.hash;
+  return addressValues();
+}
 
 /** Return the values; of two with one name the one after `#` comes last. */
 export function addressValues() {
   const { search = "", hash = "" } = globalThis.location ?? {};
-  known = hash;
   return new URLSearchParams([...new URLSearchParams(search), ...new URLSearchParams(hash.slice(1))]);
 }
 

@@ -164,7 +164,7 @@ export class Past {
     fleet.replace(frameAt(tracks, time_ms), performance.now());
     this.#trails.show(tracks, time_ms);
     this.#shownAt = performance.now();
-    if (this.#shownAt - this.#wroteAt > ADDRESS_MS && isAddressRead()) this.#writeAddress(); // never over a link that was just followed
+    if (this.#shownAt - this.#wroteAt > ADDRESS_MS) this.#writeAddress();
     if (membership !== fleet.membership) this.page.updatePanels();
     map.redraw();
   }
@@ -208,6 +208,7 @@ export class Past {
   }
 
   #writeAddress() {
+    if (!isAddressRead()) return; // never over a link that was just followed
     this.#wroteAt = performance.now();
     const { from_ms, to_ms, time_ms, speed } = this.replay;
     const isChosen = this.active && to_ms > from_ms;

@@ -1,6 +1,6 @@
 /** What the page shows, in its address: tags, part of the map, and filter. A copied link shows the same. */
 
-import { addressValues, isAddressRead, listIn, listText, writeAddress } from "../data/address.js";
+import { isAddressRead, listIn, listText, readAddress, writeAddress } from "../data/address.js";
 import { STATES } from "../data/states.js";
 
 const WRITE_MS = 500;
@@ -24,7 +24,7 @@ export class ViewAddress {
   /** Show what the address says. */
   read() {
     const { choice, filter } = this;
-    const values = addressValues();
+    const values = readAddress();
     const hidden = (values.get("hide") ?? "").split(",");
     filter.value = values.get("text") ?? "";
     choice.filter({
