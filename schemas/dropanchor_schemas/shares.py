@@ -43,7 +43,7 @@ class Share(Frozen):
     expires_ns: int = Field(description="UTC, ns: from then on the link does not work.")
     tag: str | None
     group: str | None
-    site: str | None = Field(default=None, description="The id of the site that the link shows.")
+    site: str = Field(description="The id of the site that the link shows.")
 
 
 class NewShare(Share):

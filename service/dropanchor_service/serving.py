@@ -44,7 +44,7 @@ class Serving:
     ) -> None:
         self._settings = settings
         self._credentials = credentials
-        self._authenticator = authenticator_of(settings, None if sites.only is None else sites.only.id, recovery)
+        self._authenticator = authenticator_of(settings, recovery)
         self.border = border_of(settings.http, credentials)
         self.simulated = SimulatedTags()
         self._sites = sites

@@ -79,7 +79,7 @@ class Parts:
         sites, metrics = open_sites(settings, self.recovery), Metrics()
         sites[0].tags.register("cart")
         self.site, now_ns = sites[0].store, lambda: T_NS
-        links = share_links_of(authenticator_of(settings, "default", self.recovery))
+        links = share_links_of(authenticator_of(settings, self.recovery))
         assert links is not None
         self.links = links
         self.persistence = SiteFolders(settings, sites, now_ns, metrics, self.recovery).all[0]

@@ -11,7 +11,7 @@ from dropanchor_schemas.events import Event
 from dropanchor_schemas.zones import Circle, EventRule, Zone
 from dropanchor_service.estimation.columns import HYPOTHESIS, State, StateReason
 from dropanchor_service.events.alarms import OPEN, StoredAlarm, alarms, open_alarms
-from dropanchor_service.events.database import Database
+from dropanchor_service.events.database import VERSION, Database
 from dropanchor_service.events.drafts import Draft
 from dropanchor_service.events.site_watch import WatchedSite
 from dropanchor_service.events.store import EventStore
@@ -26,9 +26,6 @@ KEEP = Retention(keep_ns=10**18, max_bytes=2**40)
 
 
 _BACK = (
-    "ALTER TABLE deliveries RENAME destination TO webhook",
-    "DROP TABLE stays",
-    "DROP INDEX dead_letters; ALTER TABLE deliveries DROP COLUMN again_ns",
     "DROP TABLE starts",
     "DROP TABLE changes",
     "DROP TABLE alarms",
@@ -39,7 +36,7 @@ _BACK = (
 def make_older(database: Database, version: int) -> None:
     """Make the file one of an earlier version, and close it."""
     with database.transaction() as connection:
-        for step in "; ".join(reversed(_BACK[version - 1 :])).split("; "):
+        for step in "; ".join(reversed(_BACK[version - VERSION :])).split("; "):
             connection.execute(step)
         connection.execute(f"PRAGMA user_version = {version}")
     database.close()

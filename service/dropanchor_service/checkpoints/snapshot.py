@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from dropanchor_schemas.keys import NOT_IDS
 from dropanchor_schemas.site import Anchor
 from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, UnreadableLayoutError
 from dropanchor_service.checkpoints.layouts import name_of, version_of, why_unreadable
@@ -114,7 +113,7 @@ class ServiceState:
             site.store.restore_indices(of_sites[site.index])
         self._engine.anchors.restore([sites[place].index for place, _ in anchors])
         for place, tag in tags:
-            sites[place].tags.register(_id_of(tag))
+            sites[place].tags.register(tag)
 
     def _sites_in(self, document: dict[str, Any]) -> list[ServedSite]:
         """Return the sites of a document, in its order. One that is no longer served keeps its rows."""
@@ -136,11 +135,6 @@ class ServiceState:
             elif self._sites[tag.site].store.was_deleted_after(tag.name, tag.last_heard_ns or 0):
                 self._rows.delete(tag.row)
                 self._latest.forget(tag.row)
-
-
-def _id_of(name: str) -> str:
-    """Return the id of a tag in a checkpoint. Earlier versions admitted `.` and `..`, which are none now."""
-    return name.replace(".", "%2E") if name in NOT_IDS else name
 
 
 def _part(snapshot: Snapshot, part: str) -> dict[str, Array]:

@@ -59,8 +59,7 @@ def _revoke(folder: SecurityFolder, arguments: argparse.Namespace) -> None:
 
 def _list(folder: SecurityFolder, _arguments: argparse.Namespace) -> None:
     for name, tag in sorted(folder.table.tags.items()):
-        state = "admitted" if name in folder.table.admitted else "no id of a tag, not admitted"
-        state = state if tag.revoked is None else f"revoked {tag.revoked:%Y-%m-%d}"
+        state = "admitted" if tag.revoked is None else f"revoked {tag.revoked:%Y-%m-%d}"
         print(f"{name}\t{state}\tcertificate expires {tag.expires:%Y-%m-%d}\tserial {tag.serial}")
 
 

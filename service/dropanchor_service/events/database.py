@@ -23,13 +23,6 @@ BUSY_S = 5.0
 CHECK_S = 1.0  # at a start: a large file is checked in part
 INSTEAD = say("new_events", "new events start, and what waited for its destinations is lost")
 
-_STAYS = """
-CREATE TABLE stays (tag TEXT NOT NULL, zone TEXT NOT NULL, entered_ns INTEGER NOT NULL, left_ns INTEGER NOT NULL);
-CREATE INDEX stays_by_end ON stays (left_ns);
-"""
-_DEAD_LETTERS = """
-CREATE INDEX dead_letters ON deliveries (destination, again_ns) WHERE dead IS NOT NULL;
-"""
 _STARTS = """
 CREATE TABLE starts (
     tag TEXT PRIMARY KEY, place TEXT NOT NULL, before TEXT NOT NULL, first INTEGER NOT NULL, since_ns INTEGER NOT NULL,
@@ -52,14 +45,6 @@ CREATE TABLE alarms (
 CREATE INDEX open_alarms ON alarms (source, item, tag, other) WHERE over_ns IS NULL;
 CREATE INDEX current_alarms ON alarms (sequence) WHERE over_ns IS NULL OR acknowledged IS NULL;
 """
-_STAYS_OF_EVENTS = """
-INSERT INTO stays SELECT tag, zone, entered_ns, since_ns FROM (
-    SELECT tag, zone, type, since_ns, lag(type) OVER pairs AS before, lag(since_ns) OVER pairs AS entered_ns
-    FROM (SELECT *, json_extract(body, '$.data.since_ns') AS since_ns FROM events)
-    WHERE type IN ('dropanchor.zone.enter', 'dropanchor.zone.exit')
-    WINDOW pairs AS (PARTITION BY tag, zone ORDER BY sequence)
-) WHERE type = 'dropanchor.zone.exit' AND before = 'dropanchor.zone.enter';
-"""
 _SCHEMA = f"""
 CREATE TABLE events (
     sequence INTEGER PRIMARY KEY AUTOINCREMENT, type TEXT NOT NULL, tag TEXT NOT NULL, zone TEXT,
@@ -76,8 +61,9 @@ CREATE TABLE deliveries (
     again_ns INTEGER,
     PRIMARY KEY (destination, sequence)
 ) WITHOUT ROWID;
-{_DEAD_LETTERS}
-{_STAYS}
+CREATE INDEX dead_letters ON deliveries (destination, again_ns) WHERE dead IS NOT NULL;
+CREATE TABLE stays (tag TEXT NOT NULL, zone TEXT NOT NULL, entered_ns INTEGER NOT NULL, left_ns INTEGER NOT NULL);
+CREATE INDEX stays_by_end ON stays (left_ns);
 {_STARTS}
 {_CHANGES}
 {_ALARMS}
@@ -86,14 +72,12 @@ PRAGMA user_version = {VERSION};
 
 
 _STEPS = (
-    "ALTER TABLE deliveries RENAME webhook TO destination;",
-    f"{_STAYS} {_STAYS_OF_EVENTS}",
-    f"ALTER TABLE deliveries ADD again_ns INTEGER; {_DEAD_LETTERS}",
     _STARTS,
     _CHANGES,
     _ALARMS,
 )
 """From each version to the next one."""
+_RELEASED = VERSION - len(_STEPS)  # first
 
 
 class EventFileError(sqlite3.Error):
@@ -203,13 +187,13 @@ class Database:
     def _prepare(self, connection: sqlite3.Connection) -> None:
         version = connection.execute("PRAGMA user_version").fetchone()[0]
         tables = connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
-        for step in _STEPS[version - 1 :] if 0 < version < VERSION else ():
+        if version < _RELEASED and tables:
+            raise EventFileError(f"{self._path} is another kind of database: move the file away")
+        for step in _STEPS[version - _RELEASED :] if version else ():
             version += 1
             connection.executescript(f"BEGIN; {step} PRAGMA user_version = {version}; COMMIT;")
         if self._path is not None and version > VERSION:
             raise EventFileError(later_schema(self._path, version, VERSION, self._path))
-        if version == 0 and tables:
-            raise EventFileError(f"{self._path} is another kind of database: move the file away")
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")  # an event that was answered with survives a power failure
         connection.execute("PRAGMA journal_size_limit = 67108864")

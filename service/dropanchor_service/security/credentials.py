@@ -69,12 +69,10 @@ def certificate_of(settings: HttpSettings, credentials: SecurityFolder | None) -
     return None if credentials is None else Certificate(credentials.certificate(SERVICE), credentials.key(SERVICE))
 
 
-def authenticator_of(
-    settings: Settings, only_site: str | None = None, recovery: Recovery | None = None
-) -> Authenticator | None:
+def authenticator_of(settings: Settings, recovery: Recovery | None = None) -> Authenticator | None:
     """Return what authenticates REST requests; None when anonymous access is allowed. Raises SettingsError.
 
-    only_site: its id; None: there are several. recovery: reports damaged files of share links.
+    recovery: reports damaged files of share links.
     """
     providers = _providers_of(settings)
     folder = settings.data_dir or settings.security.folder
@@ -83,7 +81,7 @@ def authenticator_of(
     if folder is None:
         return Authenticator(providers)
     try:
-        links = ShareLinks(folder, only_site=only_site, recovery=recovery)
+        links = ShareLinks(folder, recovery=recovery)
     except NewerFileError as error:
         raise SettingsError(f"share links: {error}") from error
     return Authenticator({share_links.SOURCE: links, **providers})

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from dropanchor_schemas.keys import NOT_IDS
 from dropanchor_schemas.models import Exact
 from dropanchor_service.security.access_control import Holder
 
@@ -36,11 +35,8 @@ class Table(Exact):
 
     @property
     def admitted(self) -> list[str]:
-        """The common names of the tags whose certificates are not revoked, and which the router can let in.
-
-        Earlier versions issued certificates to `.` and `..`, which cannot be the ids of tags.
-        """
-        return [name for name, tag in self.tags.items() if tag.revoked is None and self.holder(name).tag not in NOT_IDS]
+        """The common names of the tags whose certificates are not revoked."""
+        return [name for name, tag in self.tags.items() if tag.revoked is None]
 
     def common_name(self, site: str, tag: str) -> str:
         """Return the common name of the certificate of a tag. A tag of the first site has its id alone."""

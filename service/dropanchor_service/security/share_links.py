@@ -47,18 +47,16 @@ class ShareLinks:
         self,
         folder: Path,
         clock: Callable[[], float] = time.time,
-        only_site: str | None = None,
         recovery: Recovery | None = None,
     ) -> None:
         """Read the key and the list, or create the key. What is damaged ends all links, and `recovery` reports it.
 
         Raises NewerFileError.
 
-        clock: Unix time. only_site: that of links which do not say of which they are, as earlier versions made them.
+        clock: Unix time.
         """
         self._recovery = recovery or Recovery()
         self._clock = clock
-        self._only_site = only_site
         self._file = folder / TABLE_FILE
         self._key = self._key_in(folder / KEY_FILE)
         self._lock = Lock()
@@ -127,10 +125,6 @@ class ShareLinks:
             raise UnauthenticatedError(say("why_link_expired", "the share link has expired"))
         if link is None:
             raise UnauthenticatedError(say("why_link_revoked", "the share link was revoked"))
-        if link.site is None:
-            raise UnauthenticatedError(
-                say("why_link_siteless", "the share link does not say of which site it is: create another one")
-            )
         limit = None if link.tag is None and link.group is None else Limit(link.tag, link.group)
         return Identity(SOURCE, link.id, None, link.expires_ns / NS, limit=limit, of_sites={link.site: Scope.READ})
 
@@ -150,8 +144,7 @@ class ShareLinks:
 
     def _read(self) -> Mapping[str, Share]:
         """Return the list. There is no copy of it: that could have a link which was revoked since."""
-        found = self._recovery.read_alone(self._file, _TABLE.validate_json, ENDED) or {}
-        return {name: self._with_site(link) for name, link in found.items()}
+        return self._recovery.read_alone(self._file, _TABLE.validate_json, ENDED) or {}
 
     def _key_in(self, path: Path) -> bytes:
         """Return the key in a file, which is created if it is missing."""
@@ -171,9 +164,6 @@ class ShareLinks:
                 )
             )
         return key
-
-    def _with_site(self, link: Share) -> Share:
-        return link if link.site is not None else link.model_copy(update={"site": self._only_site})
 
     def _write(self, links: Mapping[str, Share]) -> None:
         content = json.dumps(_TABLE.dump_python(dict(links), mode="json"), indent=2, ensure_ascii=False)

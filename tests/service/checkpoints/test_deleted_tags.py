@@ -19,15 +19,3 @@ def test_a_deleted_tag_stays_deleted_after_a_restart_from_an_older_checkpoint(tm
     restarted.service_state().restore(snapshot)
     assert [tag.name for tag in restarted.tags.listed()] == ["kept"]
     assert restarted.x_of(["kept", "gone"]) == [1.0, None]
-
-
-def test_a_tag_whose_name_is_no_id_any_longer_goes_on_under_another(tmp_path: Path) -> None:
-    bench = IngestBench(engine=RestorableEngine(), folder=tmp_path)
-    bench.send("a", RANGES)
-    bench.send("b", RANGES)
-    snapshot = bench.service_state().snapshot()
-    snapshot.document["tags"] = ["..", "b"]
-    restarted = IngestBench(engine=RestorableEngine(), folder=tmp_path)
-    restarted.service_state().restore(snapshot)
-    restarted.send("b", Frame(ranges=[RangeSample(1_760_000_001_000_000_000, 7, 2.0)]))
-    assert restarted.x_of(["%2E%2E", "b"]) == [1.0, 2.0]

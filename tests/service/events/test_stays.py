@@ -5,12 +5,10 @@ from pathlib import Path
 import pytest
 
 from dropanchor_schemas.site import TagSettings
-from dropanchor_schemas.zones import EventType
 from dropanchor_service.estimation.columns import State
-from dropanchor_service.events.database import Database
-from dropanchor_service.events.drafts import Draft, Stay
+from dropanchor_service.events.drafts import Stay
 from dropanchor_service.events.stays import times_in_zones
-from support.events import EventBench, S, circle, make_older
+from support.events import EventBench, S, circle
 
 
 def seconds(bench: EventBench, tag: str = "a", zone: str = "dock", from_ns: int = 0) -> float:
@@ -89,19 +87,3 @@ def test_stays_go_on_after_a_restart_and_end_with_their_retention(tmp_path: Path
     bench.store.commit([], {}, [Stay("a", "dock", 1 * S, 4 * S)])
     bench.store.prune(0, 1)  # the file is too large
     assert seconds(bench) == 0
-
-
-def test_the_events_of_an_older_file_become_stays(tmp_path: Path) -> None:
-    bench = EventBench(tmp_path)
-    happened = [
-        (EventType.ZONE_EXIT, 1),
-        (EventType.ZONE_ENTER, 3),
-        (EventType.ZONE_DWELL, 6),
-        (EventType.ZONE_EXIT, 9),
-    ]
-    drafts = [Draft(kind, "a", {"t_ns": (at + 1) * S, "since_ns": at * S, "zone": "dock"}) for kind, at in happened]
-    bench.store.commit(drafts, {})
-    make_older(bench.database, 2)
-    database = Database(tmp_path)
-    assert times_in_zones(database, 0, 100 * S, {}) == {("a", "dock"): (6 * S, 1)}
-    database.close()

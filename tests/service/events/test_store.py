@@ -117,7 +117,7 @@ def test_a_damaged_file_is_moved_aside_and_another_version_is_refused(tmp_path: 
 def test_the_queues_of_an_older_file_go_on(tmp_path: Path) -> None:
     bench = EventBench(tmp_path, addressees=["hook"])
     bench.store.commit([draft("a")], {})
-    make_older(bench.database, 1)
+    make_older(bench.database, 4)
     database = Database(tmp_path)
     assert Deliveries(database).states()["hook"].pending == 1
     assert Deliveries(database).next_chance("hook") is None

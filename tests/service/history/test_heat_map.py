@@ -1,7 +1,5 @@
 """The heat map: for how long tags were where, however long the period is."""
 
-import sqlite3
-
 import numpy as np
 import pytest
 
@@ -155,20 +153,6 @@ def test_a_period_with_too_much_is_refused(place: Place, monkeypatch: pytest.Mon
     monkeypatch.setattr("dropanchor_service.history.covering.MAX_BYTES", 100)
     with pytest.raises(TooMuchError, match="name the tags"):
         heat_map(place, 0, 3 * HOUR)
-
-
-def test_a_file_without_heat_gets_it(place: FilePlace) -> None:
-    store(place, a=days(drive(np.arange(0.0, HOUR, 10.0), speed=0.0))).close()
-    old = sqlite3.connect(place.path)
-    old.executescript("DROP TABLE heat; PRAGMA user_version = 2;")
-    old.close()
-    writer = place.writer()
-    summarise(writer)
-    writer.close()
-    with sqlite3.connect(place.path) as file:
-        assert file.execute("SELECT count(*) FROM heat").fetchone()[0] > 20
-    file.close()
-    assert heat_map(place, 0, HOUR).seconds.sum() == 3590
 
 
 def test_heat_ends_with_the_poses_that_it_counts(place: FilePlace) -> None:

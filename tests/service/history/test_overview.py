@@ -1,6 +1,5 @@
 """The overview of many tracks: figures, a few points of each tag, and what is known between them."""
 
-import sqlite3
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -269,15 +268,6 @@ def test_points_have_the_heights_of_their_poses_from_poses_and_summaries(
         np.testing.assert_allclose(found["z"], (found["t_ns"] - T_NS) / SECOND / 100, rtol=1e-6)
         assert set(found["z_std"].tolist()) == {0.25}
         assert set(found["z_source"].tolist()) == {HeightSource.PRESSURE}
-
-
-def test_a_file_without_summaries_gets_them(place: FilePlace) -> None:
-    place.writer().close()
-    old = sqlite3.connect(place.path)
-    old.executescript("DROP TABLE summaries; DROP TABLE heat; PRAGMA user_version = 1;")
-    old.close()
-    store(place, a=drive(np.arange(0.0, HOUR, 10.0))).close()
-    assert figures(overview(place, 0, HOUR), "a")["poses"] == 360
 
 
 def test_summaries_end_with_the_poses_that_they_summarise(place: FilePlace) -> None:

@@ -186,18 +186,3 @@ def test_the_service_warns_at_its_start_about_certificates_that_expire_soon(
     credentials_of(Settings(security=SecuritySettings(folder=folder.path)))
     assert "service.pem expires on" in caplog.text
     assert "dropanchor security renew" in caplog.text
-
-
-def test_a_certificate_that_was_issued_to_dots_is_not_admitted_and_can_be_revoked(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = secured_site(tmp_path / "security", "a").folder.path
-    table = json.loads((path / "issued.json").read_text())
-    table["tags"][".."] = table["tags"]["a"]
-    (path / "issued.json").write_text(json.dumps(table))
-    folder = ["--security", str(path)]
-    assert main(["tag", "list", *folder]) == 0
-    assert capsys.readouterr().out.startswith("..\tno id of a tag, not admitted")
-    assert main(["tag", "revoke", *folder, ".."]) == 0
-    subjects = json.loads((path / "router.json5").read_text())["access_control"]["subjects"]
-    assert [subject["id"] for subject in subjects] == ["service", "reader", "a"]

@@ -20,16 +20,15 @@ from dropanchor_service.history.sqlite.rows import SqliteRows
 from dropanchor_service.history.summary_table import SLOTS, SummaryTable
 from dropanchor_service.runtime.written_by import later_schema
 
-VERSION = 4  # 1: without summaries, 2: without heat, 3: without heights
+VERSION = 4
+WITHOUT_HEIGHTS = 3  # the first that was released
 MAX_ROWS = 512  # per statement: sqlite3 releases the interpreter's lock in each one and must win it back
 BUSY_S = 5.0
 
-_SUMMARY_SCHEMA = """
+_SUMMARIES = """
 CREATE TABLE summaries (
     level INTEGER NOT NULL, stretch INTEGER NOT NULL, tags BLOB NOT NULL, PRIMARY KEY (level, stretch)
 );
-"""
-_HEAT_SCHEMA = """
 CREATE TABLE heat (
     level INTEGER NOT NULL, stretch INTEGER NOT NULL, heads BLOB NOT NULL, cells BLOB NOT NULL,
     PRIMARY KEY (level, stretch)
@@ -43,16 +42,11 @@ CREATE TABLE poses (
     slot INTEGER NOT NULL, tag INTEGER NOT NULL, t_ns INTEGER NOT NULL, pose BLOB NOT NULL,
     PRIMARY KEY (slot, tag, t_ns)
 ) WITHOUT ROWID;
-{_SUMMARY_SCHEMA}
-{_HEAT_SCHEMA}
+{_SUMMARIES}
 PRAGMA user_version = {VERSION};
 """
-_AGAIN = f"{_SUMMARY_SCHEMA} {_HEAT_SCHEMA}"  # what is missing is summarised again
-_UPGRADES = {  # from each version
-    1: _AGAIN,
-    2: f"DROP TABLE summaries; {_AGAIN}",
-    3: f"DROP TABLE summaries; DROP TABLE heat; {_AGAIN}",
-}
+_ADD_HEIGHTS = f"DROP TABLE summaries; DROP TABLE heat; {_SUMMARIES}"
+"""What is missing is summarised again."""
 _USED = """
 SELECT (page_count - freelist_count) * page_size FROM pragma_page_count, pragma_freelist_count, pragma_page_size
 """
@@ -150,16 +144,15 @@ class TrackWriter:
         tables = self._connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
         if version > VERSION:
             raise TrackFileError(later_schema(self._path.name, version, VERSION, self._path))
-        if version == 0 and tables:
+        if version < WITHOUT_HEIGHTS and tables:
             raise TrackFileError(f"{self._path.name} is another kind of database: move the file away")
         self._connection.execute("PRAGMA journal_mode = WAL")
         self._connection.execute("PRAGMA synchronous = NORMAL")
         self._connection.execute("PRAGMA journal_size_limit = 67108864")
         if version == 0:
             self._connection.executescript(f"BEGIN; {_SCHEMA} COMMIT;")
-        elif version in _UPGRADES:
-            upgrade = f"{_UPGRADES[version]} PRAGMA user_version = {VERSION};"
-            self._connection.executescript(f"BEGIN; {upgrade} COMMIT;")
+        elif version == WITHOUT_HEIGHTS:
+            self._connection.executescript(f"BEGIN; {_ADD_HEIGHTS} PRAGMA user_version = {VERSION}; COMMIT;")
 
     def _insert(self, slots: list[int], tags: list[int], times: list[int], blobs: list[bytes]) -> None:
         flat = [value for row in zip(slots, tags, times, blobs, strict=True) for value in row]

@@ -20,8 +20,8 @@ from dropanchor_service.api.routes import examples
 from dropanchor_service.estimation.columns import HYPOTHESIS
 from dropanchor_service.security import share_links
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
-from dropanchor_service.security.identity import Authenticator, Scope, UnauthenticatedError
-from dropanchor_service.security.share_links import TABLE_FILE, ShareLinks
+from dropanchor_service.security.identity import Authenticator, Scope
+from dropanchor_service.security.share_links import ShareLinks
 from dropanchor_service.store import LatestPoses
 from support.api import ask, kind_of, make_api_bench
 from support.http_server import running_server
@@ -116,17 +116,6 @@ def test_a_share_link_shows_its_site_alone_and_a_limited_one_its_tags(company: C
     assert company.ask("DELETE", f"/sites/b/shares/{made['id']}", admin_of_b).status_code == 404
     assert company.ask("DELETE", f"/sites/a/shares/{made['id']}", company.admin_of_a).status_code == 204
     assert company.ask("GET", "/sites/a/poses", made["secret"]).status_code == 401
-
-
-def test_a_link_that_names_no_site_works_for_an_only_site_and_is_refused_with_several(tmp_path: Path) -> None:
-    links = ShareLinks(tmp_path)
-    share, secret = links.add("a", ShareRequest())
-    table = tmp_path / TABLE_FILE
-    table.write_text(table.read_text().replace('"site": "a"', '"site": null'))
-    assert ShareLinks(tmp_path, only_site="yard").identify(secret).of_sites == {"yard": Scope.READ}
-    with pytest.raises(UnauthenticatedError, match="does not say of which site it is: create another one"):
-        ShareLinks(tmp_path).identify(secret)
-    assert share.site == "a"
 
 
 def test_the_omlox_interface_of_a_site_holds_its_tags_alone(company: Company) -> None:

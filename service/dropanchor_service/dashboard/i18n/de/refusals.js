@@ -16,7 +16,6 @@ export default {
   "say.why_link_damaged": "Der Freigabelink ist beschädigt oder stammt von einem anderen Dienst",
   "say.why_link_expired": "Der Freigabelink ist abgelaufen",
   "say.why_link_revoked": "Der Freigabelink wurde widerrufen",
-  "say.why_link_siteless": "Der Freigabelink sagt nicht, zu welchem Standort er gehört. Legen Sie einen neuen an",
   "say.link_limited": "Dieser Freigabelink zeigt seine Tags und sonst nichts.",
   "say.link_shows": "Ein Freigabelink zeigt die Seite und sonst nichts; diese Anfrage braucht {needs}.",
   "say.busy": "{n} Anfragen und Datenströme sind offen, mehr nimmt der Dienst nicht an. Versuchen Sie es später wieder.",

@@ -10,7 +10,6 @@ export default {
   "say.why_link_damaged": "the share link is damaged, or another service made it",
   "say.why_link_expired": "the share link has expired",
   "say.why_link_revoked": "the share link was revoked",
-  "say.why_link_siteless": "the share link does not say of which site it is: create another one",
   "say.key_by_command": "This service may not change its keys. Make and revoke them with `dropanchor key`, where its credentials were made.",
   "say.id_length": "an id has 1 to {most} characters, this one has {n}",
   "say.id_dots": "{id} cannot be an id: in paths and addresses it stands for a folder",
