@@ -29,12 +29,11 @@ class Owner(NamedTuple):
     """Who holds a lock. since: UTC, as in RFC 3339."""
 
     pid: int
-    host: str = ""
-    since: str = ""
+    host: str
+    since: str
 
     def __str__(self) -> str:
-        host = f" on {self.host}" if self.host else ""
-        return f"process {self.pid}{host}" + (f" since {self.since}" if self.since else "")
+        return f"process {self.pid} on {self.host} since {self.since}"
 
 
 class FolderInUseError(OSError):
@@ -163,7 +162,5 @@ def _owner(descriptor: int) -> Owner | None:
     with suppress(OSError, ValueError, TypeError):
         os.lseek(descriptor, 0, os.SEEK_SET)
         found = json.loads(os.read(descriptor, _MOST_BYTES))
-        if isinstance(found, int):  # as earlier versions wrote it
-            return Owner(found)
         return Owner(int(found["pid"]), str(found["host"]), str(found["since"]))
     return None

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_tag_client.folder_lock import FILE, FolderInUseError, FolderLock, LockIsLinkError, Owner
+from dropanchor_tag_client.folder_lock import FILE, FolderInUseError, FolderLock, LockIsLinkError
 from support.commands import start_python
 
 HOLD = """
@@ -57,14 +57,11 @@ def test_those_who_share_a_folder_keep_out_who_wants_it_alone(tmp_path: Path) ->
         other.kill()
 
 
-def test_the_lock_of_an_earlier_version_counts(tmp_path: Path) -> None:
+def test_a_lock_that_says_nothing_counts(tmp_path: Path) -> None:
     with (tmp_path / FILE).open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         with pytest.raises(FolderInUseError, match="is in use by another process"):
             FolderLock(tmp_path)
-        file.write("4711\n")
-        file.flush()
-        assert FolderLock.holder(tmp_path) == Owner(4711)
 
 
 def test_a_file_system_without_locks_is_said_once_and_used(
