@@ -4,7 +4,7 @@ import { isMuted, isPending } from "./alarm_store.js";
 import { button, element, keepLines } from "../alerts/lines.js";
 import { age } from "../data/format.js";
 import { t } from "../i18n/language.js";
-import { write } from "../page/parts.js";
+import { instead, write } from "../page/parts.js";
 import { clock, fullTime, sentence } from "../zones/words.js";
 
 /** @typedef {import("./alarm_store.js").Alarm} Alarm */
@@ -69,10 +69,7 @@ export class AlarmList {
     form.append(seen);
     const { rule, zone, name } = alarm.event.data;
     if (alarm.over_ns === null) form.append(button(t(muted ? "alarm.unmute" : "alarm.mute"), t(muted ? "alarm.unmute_one" : "alarm.mute_one", { rule: name || rule || zone || "" }), () => this.acts.mute(alarm, !muted)));
-    form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      this.acts.acknowledge(alarm, note.value.trim());
-    });
+    instead(form, "submit", () => this.acts.acknowledge(alarm, note.value.trim()));
     return form;
   }
 }

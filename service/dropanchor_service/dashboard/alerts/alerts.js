@@ -16,7 +16,7 @@ import { RuleList } from "./rule_list.js";
 import { SecretField, newSecret } from "./secret_field.js";
 import { ruleModels } from "./rule_models.js";
 import { stuckIn } from "./words.js";
-import { partOf } from "../page/parts.js";
+import { partOf, writeOrHide } from "../page/parts.js";
 
 const COMMON = { enabled: true, types: [], zones: [], tags: [] };
 /** @type {Record<string, Record<string, any>>} */
@@ -107,9 +107,7 @@ export class Alerts {
    * @param {string} type */
   #mayMake(type) {
     const why = this.store.unavailable[type] ?? "";
-    const lacking = partOf(this.box, "lacking");
-    lacking.textContent = begun(said(why, this.store.unavailable_phrases[type]));
-    lacking.hidden = why === "";
+    writeOrHide(partOf(this.box, "lacking"), begun(said(why, this.store.unavailable_phrases[type])));
     return why === "";
   }
 

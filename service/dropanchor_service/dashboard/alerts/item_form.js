@@ -1,7 +1,7 @@
 /** The form of a destination or a rule. Fields with `data-for` belong to some types only. */
 
 import { fill, valueOf } from "../page/model_fields.js";
-import { partOf } from "../page/parts.js";
+import { instead, partOf, writeOrHide } from "../page/parts.js";
 
 /** @typedef {import("../data/items.js").Item} Item @typedef {import("../page/model_fields.js").Field} Field */
 
@@ -15,10 +15,7 @@ export class ItemForm {
     this.form = form;
     this.editor = editor;
     this.act = act;
-    form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      editor.save(this.#values(), this.#named());
-    });
+    instead(form, "submit", () => editor.save(this.#values(), this.#named()));
     form.addEventListener("reset", () => editor.close());
     form.addEventListener("input", () => (editor.isUnsaved = true));
     partOf(this.form, "newer").addEventListener("click", () => editor.item && editor.open(editor.item.id));
@@ -29,7 +26,7 @@ export class ItemForm {
   #update() {
     const { item, isNew, problem, conflict } = this.editor;
     this.form.hidden = item === null;
-    this.#write("problem", problem);
+    writeOrHide(partOf(this.form, "problem"), problem);
     partOf(this.form, "newer").hidden = !conflict;
     partOf(this.form, "delete").hidden = isNew || !this.act.mayDelete();
     if (problem !== "") partOf(this.form, "problem").scrollIntoView({ block: "nearest" });
@@ -39,7 +36,7 @@ export class ItemForm {
 
   /** @param {Item} item @param {boolean} isNew */
   #show(item, isNew) {
-    this.#write("title", this.act.title(item, isNew));
+    writeOrHide(partOf(this.form, "title"), this.act.title(item, isNew));
     for (const part of /** @type {NodeListOf<HTMLElement>} */ (this.form.querySelectorAll("[data-for]"))) {
       part.hidden = !(part.dataset.for ?? "").split(" ").includes(item.type) || (part.dataset.new !== undefined && !isNew);
     }
@@ -68,12 +65,5 @@ export class ItemForm {
   /** Return the text of which a new id is made. */
   #named() {
     return this.#fields().find((field) => field.dataset.as === "id" || field.name === "name")?.value ?? "";
-  }
-
-  /** @param {string} name @param {string} text */
-  #write(name, text) {
-    const part = partOf(this.form, name);
-    part.textContent = text;
-    part.hidden = text === "";
   }
 }

@@ -3,7 +3,7 @@
 import { t } from "../i18n/language.js";
 import { refusalInForm } from "../i18n/said.js";
 import { button, element, keepLines } from "./lines.js";
-import { partOf } from "../page/parts.js";
+import { instead, partOf, writeOrHide } from "../page/parts.js";
 
 export class NetworkList {
   /** @param {HTMLElement} box @param {import("./alert_store.js").AlertStore} store */
@@ -11,8 +11,7 @@ export class NetworkList {
     this.box = box;
     this.store = store;
     this.form = /** @type {HTMLFormElement} */ (partOf(box, "allow-form"));
-    this.form.addEventListener("submit", async (event) => {
-      event.preventDefault();
+    instead(this.form, "submit", async () => {
       const field = /** @type {HTMLInputElement} */ (this.form.elements.namedItem("network"));
       if (await this.#attempt(field.value, "PUT")) field.value = "";
     });
@@ -52,8 +51,7 @@ export class NetworkList {
   /** Return whether the service did it; if not, say why. @param {string} network @param {"PUT" | "DELETE"} method */
   async #attempt(network, method) {
     const problem = await this.#refusalOf(network, method);
-    partOf(this.form, "problem").textContent = problem;
-    partOf(this.form, "problem").hidden = problem === "";
+    writeOrHide(partOf(this.form, "problem"), problem);
     return problem === "";
   }
 

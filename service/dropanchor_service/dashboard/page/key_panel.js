@@ -6,7 +6,7 @@ import { drawCode, forOthers, readConnect } from "../data/page_address.js";
 import { t, timeText } from "../i18n/language.js";
 import { refusalInForm } from "../i18n/said.js";
 import { revocableLine } from "./revocable_line.js";
-import { fieldOf, partOf } from "./parts.js";
+import { fieldOf, instead, partOf, writeOrHide } from "./parts.js";
 
 /** @typedef {{id: string, name: string, scope: string | null, tag: string | null, expires_ns: number | null}} Key */
 
@@ -15,10 +15,7 @@ export class KeyPanel {
   constructor(box) {
     this.box = box;
     this.form = /** @type {HTMLFormElement} */ (box.querySelector("form"));
-    this.form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      this.#attempt(() => this.#create());
-    });
+    instead(this.form, "submit", () => this.#attempt(() => this.#create()));
     fieldOf(this.form, "may").addEventListener("change", () => this.#askForTag());
   }
 
@@ -27,7 +24,7 @@ export class KeyPanel {
     partOf(this.box, "created").hidden = true;
     partOf(this.box, "secret").textContent = "";
     partOf(this.box, "code").hidden = partOf(this.box, "loopback").hidden = true;
-    this.#say("");
+    writeOrHide(partOf(this.box, "problem"), "");
     await this.#refresh();
   }
 
@@ -47,7 +44,6 @@ export class KeyPanel {
     const { secret } = await (await send(api("keys"), "POST", body)).json();
     this.form.reset();
     this.#askForTag();
-    this.#say("");
     partOf(this.box, "created-what").textContent = t(tag === null ? "access.created" : "access.created_tag", { tag: tag ?? "" });
     if (tag === null) partOf(this.box, "secret").textContent = secret;
     else await this.#showLink(tag, secret);
@@ -87,17 +83,13 @@ export class KeyPanel {
 
   /** @param {() => Promise<void>} act */
   async #attempt(act) {
+    let problem = "";
     try {
       await act();
     } catch (error) {
-      this.#say(refusalInForm(error));
+      problem = refusalInForm(error);
     }
-  }
-
-  /** @param {string} problem */
-  #say(problem) {
-    partOf(this.box, "problem").textContent = problem;
-    partOf(this.box, "problem").hidden = problem === "";
+    writeOrHide(partOf(this.box, "problem"), problem);
   }
 }
 

@@ -3,6 +3,7 @@
 import { chosen, remember } from "../data/display.js";
 import { t } from "../i18n/language.js";
 import { clock, kind, KINDS, sentence } from "../zones/words.js";
+import { partOf, writeOrHide } from "./parts.js";
 
 /** @typedef {import("../zones/words.js").ServiceEvent} ServiceEvent */
 
@@ -19,9 +20,8 @@ export class Notifications {
   /** @param {HTMLElement} box @param {import("../zones/event_log.js").EventLog} log @param {(event: ServiceEvent) => void} pick */
   constructor(box, log, pick) {
     this.pick = pick;
-    this.problem = /** @type {HTMLElement} */ (box.querySelector('[data-part="problem"]'));
-    const list = /** @type {HTMLElement} */ (box.querySelector('[data-part="kinds"]'));
-    list.append(...KINDS.map((type) => this.#choice(type)));
+    this.problem = partOf(box, "problem");
+    partOf(box, "kinds").append(...KINDS.map((type) => this.#choice(type)));
     log.addEventListener("event", (event) => this.#take(/** @type {CustomEvent} */ (event).detail));
   }
 
@@ -38,8 +38,7 @@ export class Notifications {
   /** @param {string} kind @param {HTMLInputElement} box */
   async #choose(kind, box) {
     const problem = box.checked ? await refusal() : "";
-    this.problem.textContent = problem;
-    this.problem.hidden = problem === "";
+    writeOrHide(this.problem, problem);
     if (problem !== "") box.checked = false;
     if (box.checked) this.#kinds.add(kind);
     else this.#kinds.delete(kind);

@@ -12,6 +12,13 @@ export const fieldOf = (form, name) => /** @type {HTMLInputElement} */ (form.ele
 /** Return the number in a field; null when it is empty. @param {HTMLInputElement} input */
 export const numberOf = (input) => (Number.isNaN(input.valueAsNumber) ? null : input.valueAsNumber);
 
+/** Do this instead of what a browser does with a form. @param {HTMLElement} form @param {"submit" | "reset"} what
+ * @param {(event: Event) => unknown} act */
+export const instead = (form, what, act) => form.addEventListener(what, (event) => {
+  event.preventDefault();
+  act(event);
+});
+
 /** @param {Element} element @param {string} text */
 export function write(element, text) {
   if (element.textContent !== text) element.textContent = text;

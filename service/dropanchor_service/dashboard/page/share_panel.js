@@ -6,7 +6,7 @@ import { api, getJson } from "../data/connection.js";
 import { t, timeText } from "../i18n/language.js";
 import { refusal } from "../i18n/said.js";
 import { revocableLine } from "./revocable_line.js";
-import { partOf } from "./parts.js";
+import { instead, partOf, writeOrHide } from "./parts.js";
 
 /** @typedef {{id: string, name: string, expires_ns: number, tag: string | null, group: string | null}} Share */
 
@@ -16,16 +16,13 @@ export class SharePanel {
     this.box = box;
     this.choice = choice;
     this.form = /** @type {HTMLFormElement} */ (box.querySelector("form"));
-    this.form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      this.#attempt(() => this.#create());
-    });
+    instead(this.form, "submit", () => this.#attempt(() => this.#create()));
   }
 
   /** Show the links, and offer what the page shows now. Without the right to share, or anything to protect, show nothing. */
   async open() {
     partOf(this.box, "created").hidden = true;
-    this.#say("");
+    writeOrHide(partOf(this.box, "problem"), "");
     this.#offer();
     await this.#refresh();
   }
@@ -57,7 +54,6 @@ export class SharePanel {
     };
     const { path } = await (await send(api("shares"), "POST", body)).json();
     await this.#refresh();
-    this.#say("");
     partOf(this.box, "link").textContent = new URL(path.replace(/^[^?#]*/, ""), new URL(".", document.baseURI)).href;
     partOf(this.box, "created").hidden = false;
   }
@@ -81,16 +77,12 @@ export class SharePanel {
 
   /** @param {() => Promise<void>} act */
   async #attempt(act) {
+    let problem = "";
     try {
       await act();
     } catch (error) {
-      this.#say(refusal(error));
+      problem = refusal(error);
     }
-  }
-
-  /** @param {string} problem */
-  #say(problem) {
-    partOf(this.box, "problem").textContent = problem;
-    partOf(this.box, "problem").hidden = problem === "";
+    writeOrHide(partOf(this.box, "problem"), problem);
   }
 }

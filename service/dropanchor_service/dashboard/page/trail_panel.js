@@ -5,7 +5,7 @@ import { saveFile } from "../data/save_file.js";
 import { t, timeText } from "../i18n/language.js";
 import { refusal } from "../i18n/said.js";
 import { ChangedMeanwhileError } from "../data/access.js";
-import { partOf } from "./parts.js";
+import { partOf, writeOrHide } from "./parts.js";
 
 /** @typedef {import("../data/trail.js").Entry} Entry @typedef {import("../data/trail.js").Setting} Setting @typedef {import("../data/trail.js").Held} Held */
 
@@ -96,8 +96,7 @@ export class TrailPanel {
     } catch (error) {
       problem = error instanceof NewerError || error instanceof ChangedMeanwhileError ? t("trail.newer") : refusal(error);
     }
-    partOf(this.dialog, "problem").textContent = problem;
-    partOf(this.dialog, "problem").hidden = problem === "";
+    writeOrHide(partOf(this.dialog, "problem"), problem);
   }
 }
 

@@ -4,6 +4,7 @@ import { getJson } from "../data/connection.js";
 import { shareToken } from "../data/shared.js";
 import { t } from "../i18n/language.js";
 import { said } from "../i18n/said.js";
+import { writeOrHide } from "../page/parts.js";
 
 const PERIOD_MS = 10_000;
 
@@ -29,8 +30,7 @@ export class Impaired {
     try {
       const { impaired, impaired_phrases } = await getJson(readyUrl());
       const text = impaired.length ? t("impaired.text", { what: impaired.map((/** @type {string} */ text, /** @type {number} */ i) => said(text, impaired_phrases[i])).join("; ") }) : "";
-      if (this.banner.textContent !== text) this.banner.textContent = text;
-      this.banner.hidden = text === "";
+      writeOrHide(this.banner, text);
     } catch {
       // It is not ready, or away: the other messages say so.
     }

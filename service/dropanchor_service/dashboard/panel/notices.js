@@ -5,7 +5,7 @@ import { age } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { shareToken } from "../data/shared.js";
 import { SharedNotice } from "./shared_notice.js";
-import { byId, write } from "../page/parts.js";
+import { byId, instead, write } from "../page/parts.js";
 
 export class Notices {
   #shared = new SharedNotice();
@@ -21,7 +21,7 @@ export class Notices {
     byId("retry").addEventListener("click", () => connection.retry());
     for (const button of document.querySelectorAll("button[data-copies]")) installCopy(button);
     connection.addEventListener("status", () => this.update());
-    byId("locked").addEventListener("submit", (event) => this.#unlock(event));
+    instead(byId("locked"), "submit", () => this.#unlock());
     this.update();
   }
 
@@ -46,9 +46,7 @@ export class Notices {
     this.firstHour?.update();
   }
 
-  /** @param {Event} event */
-  #unlock(event) {
-    event.preventDefault();
+  #unlock() {
     const field = /** @type {HTMLInputElement} */ (byId("key"));
     storeKey(field.value.trim());
     field.value = "";

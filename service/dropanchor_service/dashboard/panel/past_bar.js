@@ -4,7 +4,7 @@ import { HOUR_MS, LONGEST_MS, QUICK, dayOf, gapAt, quickPeriod, stripPath } from
 import { timeOf, wallDate, wallTime } from "../data/time_zone.js";
 import { SPEEDS } from "../data/replay.js";
 import { decimal, t, timeText } from "../i18n/language.js";
-import { partOf, write } from "../page/parts.js";
+import { instead, partOf, write } from "../page/parts.js";
 
 /** A shorter gap is not worth a sentence. */
 const GAP_MS = 60_000;
@@ -25,7 +25,7 @@ export class PastBar extends EventTarget {
     this.slider = /** @type {HTMLInputElement} */ (partOf(this.bar, "slider"));
     this.speed = /** @type {HTMLSelectElement} */ (partOf(this.bar, "speed"));
     this.speed.append(...SPEEDS.map((speed) => new Option(`× ${decimal(speed, 0, 1)}`, String(speed), speed === 1)));
-    bar.addEventListener("submit", (event) => this.#choose(event));
+    instead(bar, "submit", () => this.#choose());
     partOf(this.bar, "play").addEventListener("click", () => replay.play(!replay.playing));
     partOf(this.bar, "leave").addEventListener("click", () => this.dispatchEvent(new Event("leave")));
     this.slider.addEventListener("input", () => replay.seek(replay.from_ms + Number(this.slider.value) * 1000));
@@ -109,9 +109,7 @@ export class PastBar extends EventTarget {
     this.update();
   }
 
-  /** @param {Event} event */
-  #choose(event) {
-    event.preventDefault();
+  #choose() {
     const [from_ms, to_ms] = ["from", "to"].map((name) => timeOf(this.#input(name).value));
     const isRight = to_ms > from_ms && to_ms - from_ms <= LONGEST_MS;
     if (isRight) this.#open({ from_ms, to_ms });

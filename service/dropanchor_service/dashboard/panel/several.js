@@ -4,7 +4,7 @@ import { t } from "../i18n/language.js";
 import { Comparison } from "./comparison.js";
 import { TracksExport } from "./tracks_export.js";
 import { MOST_SELECTED } from "../page/choice.js";
-import { partOf, write } from "../page/parts.js";
+import { instead, partOf, write } from "../page/parts.js";
 
 /** On a phone the table and the forms would cover the list. */
 const NARROW = "(max-width: 800px)";
@@ -29,7 +29,7 @@ export class SeveralPanel {
     partOf(this.panel, "compare").addEventListener("click", () => this.#compare());
     partOf(this.panel, "close").addEventListener("click", leave);
     this.group.addEventListener("focusin", () => this.#offerGroups());
-    this.group.addEventListener("submit", (event) => this.#putIntoGroup(event));
+    instead(this.group, "submit", () => this.#putIntoGroup());
     choice.addEventListener("change", () => this.update());
     this.update();
   }
@@ -59,9 +59,7 @@ export class SeveralPanel {
     this.group.querySelector("datalist")?.replaceChildren(...groups.map((group) => new Option(group)));
   }
 
-  /** @param {Event} event */
-  async #putIntoGroup(event) {
-    event.preventDefault();
+  async #putIntoGroup() {
     const field = /** @type {HTMLInputElement} */ (this.group.elements.namedItem("group"));
     const group = field.value.trim();
     const together = {}; // one Ctrl+Z undoes them all

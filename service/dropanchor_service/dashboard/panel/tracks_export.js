@@ -3,6 +3,7 @@
 import { readJoined } from "../data/joined_tracks.js";
 import { saveContent } from "../data/save_file.js";
 import { t } from "../i18n/language.js";
+import { instead } from "../page/parts.js";
 
 const TYPES = { csv: "text/csv", geojson: "application/geo+json" };
 
@@ -12,10 +13,7 @@ export class TracksExport {
     this.form = form;
     this.choice = choice;
     this.past = past;
-    form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      this.#save(/** @type {HTMLButtonElement | null} */ (/** @type {SubmitEvent} */ (event).submitter)?.value === "geojson" ? "geojson" : "csv");
-    });
+    instead(form, "submit", (event) => this.#save(/** @type {HTMLButtonElement | null} */ (/** @type {SubmitEvent} */ (event).submitter)?.value === "geojson" ? "geojson" : "csv"));
     choice.addEventListener("change", () => this.#say(""));
   }
 

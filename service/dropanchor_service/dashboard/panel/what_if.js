@@ -9,7 +9,7 @@ import { readMeasure, writeMeasure } from "../data/units.js";
 import { t } from "../i18n/language.js";
 import { refusal } from "../i18n/said.js";
 import { drawOther } from "../map/draw_track.js";
-import { fieldOf, partOf, write } from "../page/parts.js";
+import { fieldOf, instead, partOf, write } from "../page/parts.js";
 
 const MINUTE_MS = 60_000;
 const MOST_MS = 30 * MINUTE_MS; // that the service runs again
@@ -33,8 +33,7 @@ export class WhatIf {
     this.choice = choice;
     this.map = map;
     this.changes = changes;
-    form.addEventListener("submit", (event) => {
-      event.preventDefault();
+    instead(form, "submit", () => {
       const before_ms = fieldOf(form, "minutes").valueAsNumber * MINUTE_MS;
       this.run(this.#typed(), replay.time_ms - before_ms);
     });

@@ -7,7 +7,7 @@ import { withUnits } from "../data/format.js";
 import { readMeasure, writeMeasure } from "../data/units.js";
 import { t } from "../i18n/language.js";
 import { begun, refusal } from "../i18n/said.js";
-import { fieldOf, numberOf, partOf, writeOrHide } from "../page/parts.js";
+import { fieldOf, instead, numberOf, partOf, writeOrHide } from "../page/parts.js";
 
 const DEGREES = 180 / Math.PI;
 
@@ -36,16 +36,10 @@ export class PlanPanel {
     partOf(this.panel, "move").addEventListener("click", () => editor.setMode("move"));
     partOf(this.panel, "pick").addEventListener("click", () => editor.setMode("pick"));
     this.upload.addEventListener("change", () => this.#chosen());
-    this.upload.addEventListener("submit", (event) => this.#send(event));
+    instead(this.upload, "submit", () => this.#send());
     this.form.addEventListener("input", (event) => this.#typed(/** @type {HTMLInputElement} */ (event.target)));
-    this.form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      editor.save();
-    });
-    this.form.addEventListener("reset", (event) => {
-      event.preventDefault();
-      editor.discard();
-    });
+    instead(this.form, "submit", () => editor.save());
+    instead(this.form, "reset", () => editor.discard());
     this.list.addEventListener("click", (event) => {
       const id = /** @type {HTMLElement} */ (event.target).closest("button")?.dataset.plan;
       if (id !== undefined && id !== editor.draft?.id) panels.open("plans", () => editor.select(id));
@@ -150,9 +144,7 @@ export class PlanPanel {
     }
   }
 
-  /** @param {Event} event */
-  async #send(event) {
-    event.preventDefault();
+  async #send() {
     const files = [...(fieldOf(this.upload, "file").files ?? [])];
     const [world, file] = [files.find(({ name }) => isWorldFile(name)), files.find(({ name }) => !isWorldFile(name))];
     this.#say(file ? "" : t("plans.no_image"));

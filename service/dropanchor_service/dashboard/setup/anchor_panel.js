@@ -6,7 +6,7 @@ import { t } from "../i18n/language.js";
 import { nameKey } from "../data/order.js";
 import { readMeasure, writeMeasure } from "../data/units.js";
 import { confirmed } from "./confirm.js";
-import { fieldOf, partOf } from "../page/parts.js";
+import { fieldOf, instead, partOf } from "../page/parts.js";
 
 const FIELDS = /** @type {const} */ (["x", "y", "z"]);
 
@@ -31,14 +31,8 @@ export class AnchorPanel {
     partOf(this.panel, "new").addEventListener("click", () => this.add());
     partOf(this.panel, "delete").addEventListener("click", () => this.#delete());
     this.form.addEventListener("input", () => this.#typed());
-    this.form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      editor.save();
-    });
-    this.form.addEventListener("reset", (event) => {
-      event.preventDefault();
-      editor.cancel();
-    });
+    instead(this.form, "submit", () => editor.save());
+    instead(this.form, "reset", () => editor.cancel());
     this.list.addEventListener("click", (event) => {
       const id = /** @type {HTMLElement} */ (event.target).closest("button")?.dataset.anchor;
       if (id !== undefined && id !== editor.draft?.id) editor.choose(id);

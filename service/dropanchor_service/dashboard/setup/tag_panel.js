@@ -5,7 +5,7 @@ import { Saving } from "../data/saving.js";
 import { confirmed } from "./confirm.js";
 import { fillForm, makeFields, noteSent, patchOf, showRefused, showSources, typedIn } from "./tag_form.js";
 import { t } from "../i18n/language.js";
-import { fieldOf, numberOf, partOf } from "../page/parts.js";
+import { fieldOf, instead, numberOf, partOf } from "../page/parts.js";
 
 /** @typedef {import("../data/changes.js").Seen} Seen */
 
@@ -41,11 +41,11 @@ export class TagPanel {
     });
     panels.add("start", { isOpen: () => start.draft !== null, isUnsaved: () => start.isUnsaved, saving: () => this.#saving.now, leave: () => start.cancel() });
     this.box.addEventListener("toggle", () => this.#seen === null && this.#load());
-    this.form.addEventListener("submit", (event) => this.#save(event));
+    instead(this.form, "submit", () => this.#save());
     partOf(this.panel, "delete-tag").addEventListener("click", () => this.#delete());
     partOf(this.panel, "start").addEventListener("click", () => panels.open("start", () => this.#beginStart()));
     this.startForm.addEventListener("input", () => this.#typedStart());
-    this.startForm.addEventListener("submit", (event) => this.#saveStart(event));
+    instead(this.startForm, "submit", () => this.#saveStart());
     this.startForm.addEventListener("reset", () => start.cancel());
     start.addEventListener("change", () => this.#showStart());
     changes.addEventListener("failed", (event) => this.#saving.now && showRefused(this.form, /** @type {CustomEvent} */ (event).detail));
@@ -112,9 +112,8 @@ export class TagPanel {
     partOf(this.form, "groups").replaceChildren(...[...groups].sort().map((group) => new Option(group)));
   }
 
-  /** Save what is typed, once an earlier change is saved and shown. @param {Event} event */
-  async #save(event) {
-    event.preventDefault();
+  /** Save what is typed, once an earlier change is saved and shown. */
+  async #save() {
     const tag = this.#tag;
     await this.#saving.now;
     await this.#loading;
@@ -185,9 +184,7 @@ export class TagPanel {
     if (x !== null && y !== null) this.start.type(x, y, numberOf(fieldOf(this.startForm, "heading")));
   }
 
-  /** @param {Event} event */
-  async #saveStart(event) {
-    event.preventDefault();
+  async #saveStart() {
     const { draft } = this.start;
     if (!draft) return;
     const started = { tag: this.#tag, since_ms: performance.now() };

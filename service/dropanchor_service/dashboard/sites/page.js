@@ -8,7 +8,7 @@ import { count, t } from "../i18n/language.js";
 import { installLanguages } from "../page/display.js";
 import { installTheme } from "../page/theme.js";
 import { dots, listed, MAP, nameOf } from "./overview.js";
-import { byId } from "../page/parts.js";
+import { byId, instead } from "../page/parts.js";
 
 const REQUEST_MS = 3000;
 /** The answer grows with the sites, so a page of many asks less often. */
@@ -125,8 +125,7 @@ function shape(kind, values, text = "") {
 }
 
 byId("find").addEventListener("input", show);
-byId("locked").addEventListener("submit", (event) => {
-  event.preventDefault();
+instead(byId("locked"), "submit", () => {
   const field = /** @type {HTMLInputElement} */ (byId("key"));
   storeKey(field.value.trim());
   field.value = "";

@@ -12,7 +12,7 @@ import { remember, remembered, takeFromAddress } from "./link.js";
 import { phyphoxCode, phyphoxLink } from "./phyphox.js";
 import { hasSerial } from "./serial.js";
 import { ThisTag } from "./tag.js";
-import { byId } from "../page/parts.js";
+import { byId, instead } from "../page/parts.js";
 
 const SHOW_MS = 250;
 
@@ -123,8 +123,7 @@ function ask() {
   /** @type {HTMLInputElement} */ (byId("tag")).value = remembered()?.tag ?? "";
 }
 
-byId("form").addEventListener("submit", (event) => {
-  event.preventDefault();
+instead(byId("form"), "submit", () => {
   const { tag, key } = /** @type {Record<string, HTMLInputElement>} */ (/** @type {unknown} */ (byId("form")));
   remember(tag.value.trim(), key.value.trim());
   location.reload(); // the old key's connection and sensors end with the old page

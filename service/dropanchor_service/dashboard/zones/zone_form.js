@@ -2,7 +2,7 @@
 
 import { t } from "../i18n/language.js";
 import { fill, valueOf } from "../page/model_fields.js";
-import { fieldOf, partOf, writeOrHide } from "../page/parts.js";
+import { fieldOf, instead, partOf, writeOrHide } from "../page/parts.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone */
 
@@ -20,10 +20,7 @@ export class ZoneForm {
   constructor(form, editor, addCorner) {
     this.form = form;
     this.editor = editor;
-    form.addEventListener("submit", (event) => {
-      event.preventDefault();
-      editor.save();
-    });
+    instead(form, "submit", () => editor.save());
     form.addEventListener("reset", () => editor.close());
     form.addEventListener("input", () => editor.change(this.#values()));
     partOf(this.form, "corner").addEventListener("click", addCorner);
