@@ -4,10 +4,11 @@ import argparse
 import math
 import sys
 import time
-from collections.abc import Iterator
+from array import array
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from heapq import merge
 from operator import itemgetter
-from typing import Protocol
 
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.options import add_connection_options, is_received, opened_client
@@ -17,13 +18,8 @@ from dropanchor_tag_client.recording import Recording, read_recording
 _NS_PER_S = 1_000_000_000
 
 
-class Publish(Protocol):
-    """Hands one sample to a client."""
-
-    def __call__(self, client: TagClient, t_ns: int) -> None: ...
-
-
-Event = tuple[float, Publish]
+Event = tuple[float, Callable[..., None]]
+"""When, s, and what publishes a sample: it takes the client and `t_ns`."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -85,7 +81,7 @@ def replay(
     for t_s, publish in timeline(recording, anchor):
         if speed > 0:
             time.sleep(max(0.0, began_s + (t_s - first_s) / speed - time.monotonic()))
-        publish(client, t0_ns + round(t_s * _NS_PER_S))
+        publish(client, t_ns=t0_ns + round(t_s * _NS_PER_S))
         share = (t_s - first_s) / (last_s - first_s) if last_s > first_s else 1.0
         progress.show(share, f"{t_s - first_s:.0f} of {last_s - first_s:.0f} s, {client.sent.samples} samples sent")
     client.flush()
@@ -106,54 +102,31 @@ def span(recording: Recording, anchor: str | None = None) -> tuple[float, float]
 
 
 def _imu(recording: Recording) -> Iterator[Event]:
-    columns = recording.imu
-    if not columns:
-        return
-    for t_s, *v in zip(*(columns[name] for name in _IMU_COLUMNS), strict=True):
-        yield t_s, _imu_sample(v)
-
-
-_IMU_COLUMNS = ("t_s", "ax", "ay", "az", "gx", "gy", "gz", "mx", "my", "mz")
-
-
-def _imu_sample(v: list[float]) -> Publish:
-    mag = None if all(math.isnan(m) for m in v[6:]) else v[6:]
-    return lambda client, t_ns: client.publish_imu(v[0:3], v[3:6], mag, t_ns=t_ns)
+    for t_s, *v in _rows(recording.imu, "ax", "ay", "az", "gx", "gy", "gz", "mx", "my", "mz"):
+        mag = None if all(map(math.isnan, v[6:])) else v[6:]
+        yield t_s, partial(TagClient.publish_imu, acc=v[0:3], gyro=v[3:6], mag=mag)
 
 
 def _ranges(recording: Recording, only: str | None) -> Iterator[Event]:
-    columns = recording.ranges
-    for anchor, *row in zip(recording.range_anchors, columns["t_s"], columns["range_m"], columns["std_m"], strict=True):
-        if only is None or anchor == only:
-            yield row[0], _range_sample(anchor, row[1], row[2])
-
-
-def _range_sample(anchor: str, range_m: float, std_m: float) -> Publish:
-    return lambda client, t_ns: client.publish_range(anchor, range_m, t_ns=t_ns, std_m=std_m)
+    rows = _rows(recording.ranges, "range_m", "std_m")
+    for anchor, (t_s, range_m, std_m) in zip(recording.range_anchors, rows, strict=True):
+        if only in (None, anchor):
+            yield t_s, partial(TagClient.publish_range, anchor=anchor, range_m=range_m, std_m=std_m)
 
 
 def _headings(recording: Recording) -> Iterator[Event]:
-    columns = recording.headings
-    if not columns:
-        return
-    for t_s, yaw_rad, std_rad in zip(columns["t_s"], columns["yaw_rad"], columns["std_rad"], strict=True):
-        yield t_s, _heading_sample(yaw_rad, std_rad)
-
-
-def _heading_sample(yaw_rad: float, std_rad: float) -> Publish:
-    return lambda client, t_ns: client.publish_heading(yaw_rad, t_ns=t_ns, std_rad=std_rad)
+    for t_s, yaw_rad, std_rad in _rows(recording.headings, "yaw_rad", "std_rad"):
+        yield t_s, partial(TagClient.publish_heading, heading_rad=yaw_rad, std_rad=std_rad)
 
 
 def _pressures(recording: Recording) -> Iterator[Event]:
-    columns = recording.pressures
-    if not columns:
-        return
-    for t_s, *values in zip(*(columns[name] for name in ("t_s", "pressure_pa", "temperature_c")), strict=True):
-        yield t_s, _pressure_sample(*values)
+    for t_s, pressure_pa, temperature_c in _rows(recording.pressures, "pressure_pa", "temperature_c"):
+        yield t_s, partial(TagClient.publish_pressure, pressure_pa=pressure_pa, temperature_c=temperature_c)
 
 
-def _pressure_sample(pressure_pa: float, temperature_c: float) -> Publish:
-    return lambda client, t_ns: client.publish_pressure(pressure_pa, t_ns=t_ns, temperature_c=temperature_c)
+def _rows(columns: Mapping[str, "array[float]"], *names: str) -> Iterator[tuple[float, ...]]:
+    """Return the times and these columns, row by row; nothing of a file that the recording lacks."""
+    return zip(*(columns[name] for name in ("t_s", *names)), strict=True) if columns else iter(())
 
 
 def _behind(speed: float) -> float:
