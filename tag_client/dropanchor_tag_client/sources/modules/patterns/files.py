@@ -11,9 +11,6 @@ from dropanchor_tag_client.sources.modules.patterns.parser import Pattern, Patte
 
 _BAUD = 115_200
 _HINT = "Is an anchor on, and is --baud right?"
-_TEXTS = ("patterns", "ignore", "start", "poll")
-_SWITCHES = ("repeats", "only_named")
-_KEYS = (*_TEXTS, *_SWITCHES, "baud", "hint")
 
 
 def module_of_file(path: Path) -> Module:
@@ -24,9 +21,12 @@ def module_of_file(path: Path) -> Module:
         raise ValueError(f"{path} cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise ValueError(f"{path} is not TOML: {error}") from error
-    for key in given:
+    for key, value in given.items():
         if key not in _KEYS:
             raise ValueError(f'{path}: there is no key "{key}"; known are {", ".join(_KEYS)}')
+        is_right, expected = _KEYS[key]
+        if key != "patterns" and not is_right(value):
+            raise ValueError(f"{path}: {key} is {value!r}, {expected} was expected")
     if not _are_texts(given.get("patterns")) or not given["patterns"]:
         raise ValueError(f'{path}: patterns is missing or no list of texts: patterns = ["an{{anchor}}:{{range:m}}m"]')
     return _module(path, given)
@@ -38,19 +38,9 @@ def module_of_patterns(texts: list[str]) -> Module:
 
 
 def _module(path: Path, given: dict[str, Any]) -> Module:
-    ignore, start, poll = (given.get(key, []) for key in _TEXTS[1:])
+    ignore, start, poll = (given.get(key, []) for key in ("ignore", "start", "poll"))
+    repeats, only_named = (given.get(key, False) for key in ("repeats", "only_named"))
     baud, hint = given.get("baud", _BAUD), given.get("hint", _HINT)
-    for key, value in (("ignore", ignore), ("start", start), ("poll", poll)):
-        if not _are_texts(value):
-            raise ValueError(f"{path}: {key} is {value!r}, a list of texts was expected")
-    if not isinstance(baud, int) or isinstance(baud, bool) or baud <= 0:
-        raise ValueError(f"{path}: baud is {baud!r}, a whole number such as 115200 was expected")
-    if not isinstance(hint, str):
-        raise ValueError(f"{path}: hint is {hint!r}, a text was expected")
-    repeats, only_named = (given.get(key, False) for key in _SWITCHES)
-    for key, value in zip(_SWITCHES, (repeats, only_named), strict=True):
-        if not isinstance(value, bool):
-            raise ValueError(f"{path}: {key} is {value!r}, true or false was expected")
     parser = _parser(_checked(given["patterns"], str(path)), tuple(ignore), repeats)
     return Module(path.stem, baud, parser, commands(start), hint, commands(poll), only_named)
 
@@ -70,3 +60,13 @@ def _checked(texts: list[str], source: str) -> list[Pattern]:
 
 def _are_texts(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(one, str) for one in value)
+
+
+_TEXTS, _SWITCH = (_are_texts, "a list of texts"), (lambda value: isinstance(value, bool), "true or false")
+_KEYS: dict[str, tuple[Callable[[Any], bool], str]] = {
+    **dict.fromkeys(("patterns", "ignore", "start", "poll"), _TEXTS),
+    **dict.fromkeys(("repeats", "only_named"), _SWITCH),
+    "baud": (lambda value: type(value) is int and value > 0, "a whole number such as 115200"),
+    "hint": (lambda value: isinstance(value, str), "a text"),
+}
+"""What the value of each key has to be, and that in words."""
