@@ -113,7 +113,7 @@ def create_app_of(
     served = SitesOfApp(sites)
     app = _app_without_routes(shared, served)
     if dashboard is not None:  # before the interfaces: a page needs many files at once
-        app.router.routes.extend([*([] if served.only else [OverviewFirst()]), *page_mounts(dashboard)])
+        app.router.routes.extend([*([] if served.only else [_overview_first()]), *page_mounts(dashboard)])
     has_one_site = served.only is not None
     app.router.routes.extend(_routes(has_one_site))
     app.router.routes.extend(below(PREFIX, health_router(ready, impaired).routes))
@@ -144,16 +144,18 @@ def _refuse_what_names_no_site(app: FastAPI, sites: int) -> None:
         )
 
 
-class OverviewFirst(Route):
-    """Leads from the page without a site to the overview."""
-
-    def __init__(self) -> None:
-        super().__init__("/", lambda _: RedirectResponse("sites/"), methods=["GET"])
+class WithoutSite(Route):
+    """The page without a site in its address."""
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
         match, child_scope = super().matches(scope)
         names_site = match is not Match.NONE and "site" in Request(scope).query_params
         return (Match.NONE, {}) if names_site else (match, child_scope)
+
+
+def _overview_first() -> Route:
+    """Return what leads from the page without a site to the overview."""
+    return WithoutSite("/", lambda _: RedirectResponse("sites/"), methods=["GET"])
 
 
 def _app_without_routes(shared: SharedParts, sites: SitesOfApp) -> FastAPI:

@@ -1,8 +1,6 @@
 """Answer one question in a process of its own: it is on the standard input, as JSON, and the answer on the output."""
 
 import logging
-import os
-import resource
 import sys
 from typing import Any
 
@@ -11,16 +9,13 @@ from dropanchor_schemas.sentences import said_by
 from dropanchor_service.answers.answers import to_json
 from dropanchor_service.blackbox.chosen import BoxError
 from dropanchor_service.blackbox.questions import Question, answer_to
+from dropanchor_service.runtime.helper_process import limit
 
-CPU_S = 60
 MEMORY_BYTES = 4 * 2**30
-NICENESS = 10  # the estimators come first
 
 
 def main() -> None:
-    os.nice(NICENESS)
-    resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    limit(MEMORY_BYTES)
     logging.disable(logging.INFO)
     try:
         answer: dict[str, Any] = {"answer": answer_to(Question.model_validate_json(sys.stdin.buffer.read()))}

@@ -10,12 +10,11 @@ from typing import Any
 from fastapi import FastAPI
 from prometheus_client import CollectorRegistry
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
-from starlette.routing import BaseRoute, Match, Route
+from starlette.routing import BaseRoute, Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from dropanchor_service.api.app import DASHBOARD, MAX_BODY_BYTES, PREFIX
+from dropanchor_service.api.app import DASHBOARD, MAX_BODY_BYTES, PREFIX, WithoutSite
 from dropanchor_service.api.http.access import Access
 from dropanchor_service.api.http.borders import ANY_HOST, Border, Borders
 from dropanchor_service.api.http.errors import ProblemError, add_error_handlers
@@ -93,7 +92,7 @@ def targets_of(addresses: Iterable[str]) -> list[dict[str, Any]]:
     return [{"targets": [host.rstrip("/")], "labels": {"__scheme__": scheme}} for scheme, _, host in divided]
 
 
-class FrontPage(Route):
+class FrontPage(WithoutSite):
     """The page without a site: of several buckets the overview, of an only one what its owner has there.
 
     While that owner is away, the page of this node says so.
@@ -105,11 +104,6 @@ class FrontPage(Route):
         self._gateway = gateway
         self._page = page
         self._owners = owners
-
-    def matches(self, scope: Scope) -> tuple[Match, Scope]:
-        match, child_scope = super().matches(scope)
-        names_site = match is not Match.NONE and "site" in Request(scope).query_params
-        return (Match.NONE, {}) if names_site else (match, child_scope)
 
     async def _serve(self, scope: Scope, receive: Receive, send: Send) -> None:
         if len(self._owners.buckets) > 1:

@@ -2,8 +2,13 @@
 
 import asyncio
 import logging
+import os
+import resource
 import sys
 from contextlib import suppress
+
+CPU_S = 60
+NICENESS = 10  # the estimators come first
 
 _log = logging.getLogger(__name__)
 
@@ -46,3 +51,10 @@ class HelperProcess:
             _log.warning("%s failed: %s", self._what, errors.decode(errors="replace")[-1000:])
             return None
         return output
+
+
+def limit(memory_bytes: int) -> None:
+    """Limit what this process, which helps another one, takes from it."""
+    os.nice(NICENESS)
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
+    resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import chain
 from typing import Annotated, Any, Literal, get_args
 
 from fastapi import Query, Request
@@ -11,10 +10,10 @@ from starlette.responses import Response, StreamingResponse
 
 from dropanchor_schemas.audit import SECRET_KINDS, AuditKind, AuditList
 from dropanchor_schemas.site import Id
-from dropanchor_service.api.formats.audit import csv_lines, json_lines
+from dropanchor_service.api.formats.tables import changes_csv
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.http.router import Router
-from dropanchor_service.api.routes.contents import TEXT, file_response
+from dropanchor_service.api.routes.contents import LINES, lines_response
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.parameters import TimeNs, example_response, json_response, words_of
 from dropanchor_service.api.routes.period import require_order
@@ -104,15 +103,11 @@ def list_changes(query: Annotated[AuditQuery, Query()], request: Request) -> Res
     "/audit/file",
     summary="Download who changed which setting, as CSV or JSON lines",
     response_class=StreamingResponse,
-    responses=problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE)
-    | {200: {"content": {"application/jsonl": TEXT, "text/csv": TEXT}}},
+    responses=problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE) | LINES,
 )
 def get_changes_file(query: Annotated[AuditFileQuery, Query()], request: Request) -> Response:
     pages = _pages(parts_of(request).events.trail, query.wanted(request))
-    entries = chain(next(pages), chain.from_iterable(pages))  # what cannot be read is refused before it begins
-    if query.format == "csv":
-        return file_response(csv_lines(entries), "changes.csv", "text/csv")
-    return file_response(json_lines(entries), "changes.jsonl", "application/jsonl")
+    return lines_response("changes", pages, changes_csv if query.format == "csv" else None)
 
 
 def _pages(trail: ChangeTrail, wanted: Wanted) -> Iterator[list[dict[str, Any]]]:

@@ -7,7 +7,6 @@ import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import chain
 from threading import Event as ThreadEvent
 from typing import Annotated, Any, Literal
 
@@ -18,11 +17,11 @@ from starlette.responses import Response, StreamingResponse
 
 from dropanchor_schemas.events import EventList
 from dropanchor_schemas.zones import EventType
-from dropanchor_service.api.formats.events import csv_lines
+from dropanchor_service.api.formats.tables import events_csv
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes import event_examples as examples
-from dropanchor_service.api.routes.contents import TEXT, file_response
+from dropanchor_service.api.routes.contents import LINES, lines_response
 from dropanchor_service.api.routes.parameters import (
     COMMA,
     Ids,
@@ -143,24 +142,20 @@ def list_events(query: Annotated[EventQuery, Query()], request: Request) -> Resp
     "/events/file",
     summary="Download stored events, as CSV or JSON lines",
     response_class=StreamingResponse,
-    responses=problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE)
-    | {200: {"content": {"application/jsonl": TEXT, "text/csv": TEXT}}},
+    responses=problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE) | LINES,
 )
 def get_events_file(query: Annotated[EventFileQuery, Query()], request: Request) -> Response:
     pages = _pages(parts_of(request).events.store, query)
-    bodies = chain(next(pages), chain.from_iterable(pages))  # what cannot be read is refused before it begins
-    if query.format == "csv":
-        return file_response(csv_lines(map(orjson.loads, bodies)), "events.csv", "text/csv")
-    return file_response((body + b"\n" for body in bodies), "events.jsonl", "application/jsonl")
+    return lines_response("events", pages, events_csv if query.format == "csv" else None)
 
 
-def _pages(store: EventStore, query: EventFileQuery) -> Iterator[list[bytes]]:
+def _pages(store: EventStore, query: EventFileQuery) -> Iterator[list[Any]]:
     """Yield all events, page by page. Raises ProblemError."""
     position, selection = query.position() or 0, query.selection()
     while True:
         with reading():
             found = store.after(position, MAX_EVENTS, selection)
-        yield [event.body for event in found]
+        yield [orjson.loads(event.body) for event in found]
         if len(found) < MAX_EVENTS:
             return
         position = found[-1].sequence

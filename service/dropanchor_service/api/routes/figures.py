@@ -11,7 +11,7 @@ from starlette.responses import Response
 from dropanchor_schemas.figures import Figures
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.answers.many_tracks import NO_FIGURES, figures_of
-from dropanchor_service.api.formats.figures import figures_csv
+from dropanchor_service.api.formats.tables import figures_csv
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.http.router import Router
 from dropanchor_service.api.routes.contents import TEXT

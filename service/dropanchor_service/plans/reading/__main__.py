@@ -3,8 +3,6 @@
 The only argument is a `Request` as JSON.
 """
 
-import os
-import resource
 import sys
 
 from dropanchor_schemas.pose import Phrase
@@ -12,16 +10,13 @@ from dropanchor_schemas.sentences import said_by
 from dropanchor_service.plans.reading.messages import Description, ReadPlan, Request
 from dropanchor_service.plans.reading.read_plan import read_plan
 from dropanchor_service.plans.reading.refused import RefusedError
+from dropanchor_service.runtime.helper_process import limit
 
-CPU_S = 60
 MEMORY_BYTES = 3 * 2**30
-NICENESS = 10  # the estimators come first
 
 
 def main() -> None:
-    os.nice(NICENESS)
-    resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    limit(MEMORY_BYTES)
     request = Request.model_validate_json(sys.argv[1])
     try:
         read = read_plan(sys.stdin.buffer.read(), request)

@@ -12,8 +12,8 @@ from dropanchor_schemas.pose import PoseFrame, TimedPose
 from dropanchor_schemas.site import Georeference, Site
 from dropanchor_schemas.track import TrackPose
 from dropanchor_schemas.tracks import TagSummary
-from dropanchor_service.api.formats.figures import FIGURES
 from dropanchor_service.api.formats.parquet import schema_of
+from dropanchor_service.api.formats.tables import FIGURES
 from dropanchor_service.api.formats.track import COVARIANCES, NESTED, RELATIVES
 from dropanchor_service.recording.schemas import ESTIMATE, all_schemas
 
