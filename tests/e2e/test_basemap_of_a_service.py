@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from support.basemap_files import basemap_file, image_tile
-from support.service import ended, running_service, settings_file
-from support.zenoh_router import free_endpoint
+from support.service import running_service, settings_file
 
 
 def test_a_service_serves_the_tiles_of_its_file(tmp_path: Path) -> None:
@@ -17,11 +16,3 @@ def test_a_service_serves_the_tiles_of_its_file(tmp_path: Path) -> None:
         assert service.ask("GET", "/api/v1/basemap/1/1/0").content == tile
         assert service.ask("GET", "/api/v1/basemap/1/0/0").status_code == 204
         assert service.stop() == 0
-
-
-def test_a_missing_file_stops_the_start_with_a_sentence(tmp_path: Path) -> None:
-    settings = tmp_path / "site.toml"
-    settings.write_text(f'[basemap]\ntiles = "{tmp_path}/none.pmtiles"\n')
-    refused = ended("serve", "--config", str(settings), "--port", "0", "--zenoh-listen", free_endpoint())
-    assert refused.returncode == 2
-    assert f"basemap.tiles: {tmp_path}/none.pmtiles cannot be read: No such file or directory" in refused.stderr

@@ -45,6 +45,15 @@ def test_the_help_has_examples(command: list[str], capsys: pytest.CaptureFixture
         (["publish", "--tag", "a", "--connect", free_endpoint(), "--connect-timeout", "0.2"], "Cannot connect to"),
         (["publish", "--tag", "a", "--spool", "/proc/spool"], "the spool /proc/spool/default/a cannot be used"),
         (["publish", "--tag", "a", "--spool", "/tmp", "--clock", "boot"], "a spool needs clock='utc'"),
+        (["mqtt", "localhost"], "add --decawave, --sensor-logger TOPIC or --template FILE"),
+        (["mqtt", "ftp://localhost", "--decawave"], "mqtt://host:1883 or mqtts://host:8883 was expected"),
+        (["mqtt", "mqtt://localhost:port", "--decawave"], "the broker is"),
+        (["mqtt", "localhost", "--decawave", "--mqtt-ca", "x"], "not an mqtts:// or wss:// address"),
+        (["mqtt", "mqtts://localhost", "--decawave", "--mqtt-ca", "nowhere"], "the certificates cannot be used"),
+        (["mqtt", "localhost", "--decawave", "--mqtt-user", "x"], "DROPANCHOR_MQTT_PASSWORD"),
+        (["mqtt", "localhost", "--decawave", "--name", "x"], "ID=NAME was expected"),
+        (["mqtt", "localhost", "--template", "nowhere.toml"], "nowhere.toml"),
+        (["mqtt", "localhost", "--sensor-logger", "phones/+x"], "--sensor-logger is 'phones/+x'"),
     ],
 )
 def test_an_error_prints_a_message_and_exits_with_code_2(

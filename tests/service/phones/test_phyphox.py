@@ -8,8 +8,7 @@ import pytest
 
 from dropanchor_service.phones.phyphox import Message, parse
 from dropanchor_service.phones.phyphox_session import PhyphoxSession
-from dropanchor_tag_client.sources.phones.readings import PhoneError
-from dropanchor_tag_client.sources.phones.session import MAX_WAITING, WAIT_S
+from dropanchor_tag_client.sources.phones.session import WAIT_S
 from support.phone import Phone
 from support.phyphox import Value, event, message, recording
 from support.sensor_logger import G, Vector
@@ -60,49 +59,12 @@ def test_ten_minutes_at_100_hz_out_of_order_and_repeated_lose_no_reading_and_use
     assert [frame.sequence for frame in phone.frames] == list(range(len(phone.frames)))
 
 
-def test_a_message_that_comes_twice_is_told_and_used_once() -> None:
-    phone = make_phone()
-    [body] = recording(0.2, SENSORS, START_S)
-    assert phone.post(body) > 0
-    before = len(phone.samples)
-    assert phone.intake.post("anna", body).duplicate
-    assert len(phone.samples) == before
-
-
 def test_messages_that_overlap_give_every_reading_once() -> None:
     phone = make_phone()
     times = [round(0.01 * index, 3) for index in range(1, 61)]
     for begin in (0, 10, 20, 30):
         phone.post(message(START, START_S, at_rest(*times[begin : begin + 30])))
     assert [round((sample.t_ns - START_NS) * 1e-9, 3) for sample in phone.samples] == times
-
-
-def test_a_message_that_never_comes_is_given_up_after_a_while_and_used_when_it_comes_after_all() -> None:
-    phone = make_phone()
-    first, second, third = recording(0.6, SENSORS, START_S)
-    phone.post(first)
-    assert phone.intake.post("anna", third).waiting == 1
-    phone.intake.release_overdue()
-    assert len(phone.samples) <= 20
-    phone.now_s += WAIT_S
-    phone.intake.release_overdue()
-    assert len(phone.samples) >= 39
-    assert phone.post(second) >= 19
-    times = [sample.t_ns for sample in phone.samples]
-    assert len(times) == len(set(times)) >= 58
-
-
-def test_no_more_messages_wait_than_are_allowed() -> None:
-    phone = make_phone()
-    bodies = list(recording(0.2 * (MAX_WAITING + 2), SENSORS, START_S))
-    waiting = [phone.intake.post("anna", body).waiting for body in bodies[1:]]
-    assert max(waiting) == MAX_WAITING
-    assert waiting[-1] == 0
-
-
-def test_a_service_that_hears_an_experiment_from_its_middle_on_does_not_wait_for_its_beginning() -> None:
-    phone = make_phone()
-    assert phone.post(list(recording(4, SENSORS, START_S))[10]) >= 19
 
 
 def test_a_pause_moves_the_times_after_it_and_a_cleared_experiment_is_a_new_one() -> None:
@@ -136,29 +98,6 @@ def test_readings_that_make_no_sense_are_counted_and_harm_no_others() -> None:
     outcome = phone.intake.post("anna", json.dumps(damaged).encode())
     assert outcome.damaged == 3
     assert [round((sample.t_ns - START_NS) * 1e-9, 3) for sample in phone.samples] == [0.07]
-
-
-@pytest.mark.parametrize(
-    ("body", "sentence"),
-    [
-        (b"\xff", "is not JSON"),
-        (b"[" * 100_000, "is not JSON"),
-        (b"[]", "load it again"),
-        (b"{}", "load it again"),
-        (b'{"time": 5}', "load it again"),
-        (json.dumps({"time": {}, "gyroscope_t": 1}).encode(), "gyroscope_t is not a list"),
-        (json.dumps({"time": {}, "gyroscope_t": [1]}).encode(), "names no start"),
-        (json.dumps({"time": {"events": [3]}, "gyroscope_t": [1]}).encode(), "names no start"),
-        (json.dumps({"time": {"events": [event("START", 0, -1)]}, "gyroscope_t": [1]}).encode(), "has no time"),
-        (json.dumps({"time": {"events": [event("START", 0, 1e300)]}, "gyroscope_t": [1]}).encode(), "has no time"),
-        (b'{"time": {"events": [{"event": "START"}]}, "gyroscope_t": [1]}', "has no time"),
-    ],
-)
-def test_what_is_no_message_is_refused_with_a_sentence_and_counted(body: bytes, sentence: str) -> None:
-    phone = make_phone()
-    with pytest.raises(PhoneError, match=sentence):
-        phone.post(body)
-    assert phone.counted == [body]
 
 
 def test_an_experiment_that_has_not_begun_or_pauses_sends_nothing_and_is_welcome() -> None:

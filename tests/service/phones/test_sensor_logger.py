@@ -10,7 +10,7 @@ from dropanchor_schemas.wire import ENCODING_JSON
 from dropanchor_service.phones.intake import BATTERY_S, SESSIONS_PER_TAG
 from dropanchor_tag_client.sources.phones.readings import PhoneError
 from dropanchor_tag_client.sources.phones.sensor_logger import Message, parse
-from dropanchor_tag_client.sources.phones.session import MAX_WAITING, WAIT_S, Session
+from dropanchor_tag_client.sources.phones.session import WAIT_S, Session
 from support.phone import Phone
 from support.sensor_logger import T_NS, G, Value, Vector, message, reading, recording
 
@@ -61,26 +61,6 @@ def test_ten_minutes_at_100_hz_out_of_order_lose_no_reading_and_use_none_twice(s
     assert len({frame.boot_id for frame in phone.frames}) == 1
 
 
-def test_a_message_that_comes_twice_is_told_and_used_once() -> None:
-    phone = make_phone()
-    [body] = recording(1, ANDROID)
-    assert phone.post(body) == 99
-    assert phone.intake.post("anna", body).duplicate
-    assert len(phone.samples) == 99
-
-
-def test_a_message_that_never_comes_is_given_up_after_a_while_without_another_one() -> None:
-    phone = make_phone()
-    first, _, third = recording(3, ANDROID)
-    phone.post(first)
-    assert phone.intake.post("anna", third).waiting == 1
-    phone.intake.release_overdue()
-    assert len(phone.samples) == 99
-    phone.now_s += WAIT_S
-    phone.intake.release_overdue()
-    assert len(phone.samples) > 190
-
-
 def test_a_message_that_comes_after_it_was_given_up_is_used_all_the_same_and_with_the_signs_of_the_others() -> None:
     phone = make_phone()
     upright: dict[str, Value] = IOS | {
@@ -94,20 +74,6 @@ def test_a_message_that_comes_after_it_was_given_up_is_used_all_the_same_and_wit
     assert phone.post(second) > 90
     times = [sample.t_ns for sample in phone.samples]
     assert len(times) == len(set(times))
-
-
-def test_no_more_messages_wait_than_are_allowed() -> None:
-    phone = make_phone()
-    bodies = list(recording(MAX_WAITING + 2, ANDROID))
-    waiting = [phone.intake.post("anna", body).waiting for body in bodies[1:]]
-    assert max(waiting) == MAX_WAITING
-    assert waiting[-1] == 0
-
-
-def test_a_service_that_hears_a_recording_from_its_middle_on_does_not_wait_for_its_beginning() -> None:
-    phone = make_phone()
-    bodies = list(recording(60, ANDROID))
-    assert phone.post(bodies[57]) == 99
 
 
 def test_a_new_recording_ends_the_wait_of_the_oldest_of_its_tag() -> None:
@@ -144,29 +110,6 @@ def test_times_as_text_and_values_beside_them_are_understood() -> None:
         for name, z in (("Gyroscope", 0.0), ("TotalAcceleration", G))
     ]
     assert phone.post(message(0, readings)) == 1
-
-
-@pytest.mark.parametrize(
-    ("body", "sentence"),
-    [
-        (b"", "is not JSON"),
-        (b"\xff", "is not JSON"),
-        (b"[" * 100_000, "is not JSON"),
-        (b"[1]", "is not a JSON object"),
-        (b'{"payload": 1}', "payload is not a list"),
-        (json.dumps({"messageId": 0, "payload": [1]}).encode(), "sessionId is not"),
-        (json.dumps({"messageId": 0, "sessionId": "", "payload": [1]}).encode(), "sessionId is not"),
-        (json.dumps({"messageId": 0, "sessionId": "x" * 200, "payload": [1]}).encode(), "sessionId is not"),
-        (json.dumps({"messageId": -1, "sessionId": "a", "payload": [1]}).encode(), "messageId is not"),
-        (json.dumps({"messageId": True, "sessionId": "a", "payload": [1]}).encode(), "messageId is not"),
-        (json.dumps({"messageId": 2**60, "sessionId": "a", "payload": [1]}).encode(), "messageId is not"),
-    ],
-)
-def test_what_is_no_message_is_refused_with_a_sentence_and_counted(body: bytes, sentence: str) -> None:
-    phone = make_phone()
-    with pytest.raises(PhoneError, match=sentence):
-        phone.post(body)
-    assert phone.counted == [body]
 
 
 @pytest.mark.parametrize(

@@ -61,19 +61,6 @@ def test_invalid_parameters_are_refused(bench: ApiBench, query: str) -> None:
     assert kind_of(ask(bench.app(), "GET", f"/api/v1/heat-map?{query}")) == "invalid-request"
 
 
-def test_too_much_no_history_and_a_damaged_one_are_different_problems(
-    bench: ApiBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert kind_of(ask(make_api_bench().app(), "GET", "/api/v1/heat-map")) == "no-history"
-    with monkeypatch.context() as patched:
-        patched.setattr("dropanchor_service.history.covering.MAX_BYTES", -1)
-        refused = ask(bench.app(), "GET", "/api/v1/heat-map")
-    assert (kind_of(refused), "name the tags" in refused.text) == ("invalid-request", True)
-    for file in tmp_path.glob("history.sqlite*"):
-        file.write_bytes(b"torn " * 1000)
-    assert kind_of(ask(bench.app(), "GET", "/api/v1/heat-map")) == "history-unreadable"
-
-
 @pytest.mark.parametrize(("limit", "seconds"), [({"tag": "a"}, [120]), ({"group": "forklifts"}, [90])])
 def test_a_share_link_shows_the_heat_of_its_tags_however_one_asks(
     bench: ApiBench, tmp_path: Path, limit: dict[str, str], seconds: list[float]

@@ -166,15 +166,6 @@ def test_invalid_track_parameters_are_refused(tmp_path: Path, query: str) -> Non
     assert kind_of(ask(driven(tmp_path).app(), "GET", f"/api/v1/tags/a/track?{query}")) == "invalid-request"
 
 
-def test_an_unknown_tag_a_missing_history_and_a_damaged_one_are_different_problems(tmp_path: Path) -> None:
-    bench = driven(tmp_path)
-    assert kind_of(ask(bench.app(), "GET", "/api/v1/tags/nobody/track")) == "unknown-tag"
-    assert kind_of(ask(make_api_bench().app(), "GET", "/api/v1/tags/a/track")) == "no-history"
-    for file in tmp_path.glob("history.sqlite*"):
-        file.write_bytes(b"torn " * 1000)
-    assert kind_of(ask(bench.app(), "GET", "/api/v1/tags/a/track")) == "history-unreadable"
-
-
 def pose_at(bench: ApiBench, offset_s: float) -> Pose:
     response = ask(bench.app(), "GET", f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}")
     assert response.status_code == 200, response.text

@@ -71,20 +71,6 @@ def test_invalid_parameters_are_refused(tmp_path: Path, query: str) -> None:
     assert kind_of(ask(driven(tmp_path).app(), "GET", f"/api/v1/tracks?{query}")) == "invalid-request"
 
 
-def test_too_much_a_missing_history_and_a_damaged_one_are_different_problems(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bench = driven(tmp_path)
-    assert kind_of(ask(make_api_bench().app(), "GET", "/api/v1/tracks")) == "no-history"
-    monkeypatch.setattr("dropanchor_service.history.overview.MAX_POSES", 0)
-    monkeypatch.setattr("dropanchor_service.history.covering.MAX_BYTES", -1)
-    refused = ask(bench.app(), "GET", "/api/v1/tracks")
-    assert (kind_of(refused), "name the tags" in refused.text) == ("invalid-request", True)
-    for file in tmp_path.glob("history.sqlite*"):
-        file.write_bytes(b"torn " * 1000)
-    assert kind_of(ask(bench.app(), "GET", "/api/v1/tracks")) == "history-unreadable"
-
-
 def exported(bench: ApiBench, form: str) -> str:
     response = ask(bench.app(), "GET", f"/api/v1/tags/a/track/file?format={form}")
     assert response.status_code == 200, response.text

@@ -192,27 +192,6 @@ def test_tls_and_a_password_are_used_and_a_foreign_certificate_is_refused(
             wait_until(lambda: ranges(heard))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["localhost"], "add --decawave, --sensor-logger TOPIC or --template FILE"),
-        (["ftp://localhost", "--decawave"], "mqtt://host:1883 or mqtts://host:8883 was expected"),
-        (["mqtt://localhost:port", "--decawave"], "the broker is"),
-        (["localhost", "--decawave", "--mqtt-ca", "x"], "not an mqtts:// or wss:// address"),
-        (["mqtts://localhost", "--decawave", "--mqtt-ca", "nowhere"], "the certificates cannot be used"),
-        (["localhost", "--decawave", "--mqtt-user", "x"], "DROPANCHOR_MQTT_PASSWORD"),
-        (["localhost", "--decawave", "--name", "x"], "ID=NAME was expected"),
-        (["localhost", "--template", "nowhere.toml"], "nowhere.toml"),
-        (["localhost", "--sensor-logger", "phones/+x"], "--sensor-logger is 'phones/+x'"),
-    ],
-)
-def test_an_error_prints_a_message_and_exits_with_code_2(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["mqtt", *arguments]) == 2
-    assert message in capsys.readouterr().err
-
-
 def test_a_rule_with_an_unknown_place_ends_the_program_and_lists_what_is_known(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
