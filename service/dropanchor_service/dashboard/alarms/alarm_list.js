@@ -1,7 +1,8 @@
 /** The list of alarms above the tags: what is wrong, since when, who knows of it, and what to do. */
 
 import { isMuted, isPending } from "./alarm_store.js";
-import { button, element, keepLines } from "../alerts/lines.js";
+import { keepLines } from "../alerts/lines.js";
+import { button, element } from "../page/elements.js";
 import { age } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { instead, write } from "../page/parts.js";

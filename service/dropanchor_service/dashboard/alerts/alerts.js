@@ -10,7 +10,7 @@ import { AlertStore } from "./alert_store.js";
 import { DestinationList } from "./destination_list.js";
 import { ItemEditor } from "./item_editor.js";
 import { ItemForm } from "./item_form.js";
-import { button, element } from "./lines.js";
+import { button, element } from "../page/elements.js";
 import { NetworkList } from "./network_list.js";
 import { RuleList } from "./rule_list.js";
 import { SecretField, newSecret } from "./secret_field.js";

@@ -1,7 +1,8 @@
 /** The list of destinations: where events go, how many wait, what is wrong, and what to do about it. */
 
 import { clock, sentence } from "../zones/words.js";
-import { button, element, keepLines } from "./lines.js";
+import { keepLines } from "./lines.js";
+import { button, element } from "../page/elements.js";
 import { queueWords, whereTo } from "./words.js";
 import { t } from "../i18n/language.js";
 import { refusal } from "../i18n/said.js";

@@ -17,15 +17,3 @@ export function keepLines(list, lines) {
   });
   while (list.children.length > lines.length) list.lastElementChild?.remove();
 }
-
-/** @param {string} name @param {string} text @param {string} [className] */
-export const element = (name, text, className = "") => Object.assign(document.createElement(name), { textContent: text, className });
-
-/** @param {string} text @param {string} label @param {() => void} act */
-export function button(text, label, act) {
-  const made = /** @type {HTMLButtonElement} */ (element("button", text, "text"));
-  made.type = "button";
-  made.setAttribute("aria-label", label);
-  made.addEventListener("click", act);
-  return made;
-}

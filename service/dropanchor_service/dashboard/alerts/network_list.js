@@ -2,7 +2,8 @@
 
 import { t } from "../i18n/language.js";
 import { refusalInForm } from "../i18n/said.js";
-import { button, element, keepLines } from "./lines.js";
+import { keepLines } from "./lines.js";
+import { button, element } from "../page/elements.js";
 import { instead, partOf, writeOrHide } from "../page/parts.js";
 
 export class NetworkList {

@@ -1,6 +1,7 @@
 /** The list of rules, also of those that belong to zones. */
 
-import { button, element, keepLines } from "./lines.js";
+import { keepLines } from "./lines.js";
+import { button, element } from "../page/elements.js";
 import { ruleWords, zoneWords } from "./words.js";
 import { t } from "../i18n/language.js";
 

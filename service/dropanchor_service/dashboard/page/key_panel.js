@@ -7,6 +7,7 @@ import { t, timeText } from "../i18n/language.js";
 import { refusalInForm } from "../i18n/said.js";
 import { revocableLine } from "./revocable_line.js";
 import { fieldOf, instead, partOf, writeOrHide } from "./parts.js";
+import { line } from "./elements.js";
 
 /** @typedef {{id: string, name: string, scope: string | null, tag: string | null, expires_ns: number | null}} Key */
 
@@ -73,7 +74,7 @@ export class KeyPanel {
   #line({ id, name, scope, tag, expires_ns }, isRevocable) {
     const what = tag === null ? t(scope === "write" ? "access.word_write" : "access.word_read") : t("access.word_tag", { tag });
     const text = lineOf(name, what, expires_ns);
-    if (!isRevocable) return Object.assign(document.createElement("li"), { textContent: text });
+    if (!isRevocable) return line(text);
     return revocableLine(text, name, () => this.#attempt(async () => {
       await send(api(`keys/${id}`), "DELETE", null);
       partOf(this.box, "created").hidden = true;

@@ -1,7 +1,7 @@
 /** Fields of forms: made of the JSON schema that validates them, filled, and read. */
 
 import { installUnits, measureText, readMeasure, writeMeasure } from "../data/units.js";
-import { element } from "../alerts/lines.js";
+import { element } from "./elements.js";
 import { decimal, has, t } from "../i18n/language.js";
 
 /** @typedef {HTMLInputElement | HTMLSelectElement | HTMLTextAreaElement} Field */

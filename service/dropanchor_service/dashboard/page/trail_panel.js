@@ -6,6 +6,7 @@ import { t, timeText } from "../i18n/language.js";
 import { refusal } from "../i18n/said.js";
 import { ChangedMeanwhileError } from "../data/access.js";
 import { partOf, writeOrHide } from "./parts.js";
+import { button, element, line } from "./elements.js";
 
 /** @typedef {import("../data/trail.js").Entry} Entry @typedef {import("../data/trail.js").Setting} Setting @typedef {import("../data/trail.js").Held} Held */
 
@@ -74,18 +75,12 @@ export class TrailPanel {
 
   /** @param {string} text @param {string} label of its button @param {string} spoken @param {(() => Promise<void>) | null} act */
   #line(text, label, spoken, act) {
-    const line = document.createElement("li");
-    line.append(Object.assign(document.createElement("span"), { textContent: text }));
-    if (act === null || !this.changes.mayWrite) return line;
-    const button = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: label });
-    button.setAttribute("aria-label", spoken);
-    button.addEventListener("click", () => this.#attempt(async () => {
+    if (act === null || !this.changes.mayWrite) return line(element("span", text));
+    return line(element("span", text), button(label, spoken, () => this.#attempt(async () => {
       await act();
       await this.#refresh();
       partOf(this.dialog, "values").focus();
-    }));
-    line.append(button);
-    return line;
+    })));
   }
 
   /** @param {() => Promise<void>} act */

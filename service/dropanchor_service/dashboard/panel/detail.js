@@ -14,6 +14,7 @@ import { Plots } from "./plots.js";
 import { showUncertainty } from "./uncertainty.js";
 import { symbol } from "../map/symbols.js";
 import { partOf, write, writeOrHide } from "../page/parts.js";
+import { button, line } from "../page/elements.js";
 
 /** @typedef {import("../data/fleet.js").Fleet} Fleet */
 
@@ -167,18 +168,16 @@ export class Detail {
     if (list.dataset.shown === shown) return;
     list.dataset.shown = shown;
     list.replaceChildren(...cares.map(({ hint, hint_phrase, setting }) => {
-      const item = Object.assign(document.createElement("li"), { textContent: said(hint, hint_phrase) });
-      if (setting && mayWrite) item.append(" ", this.#acceptButton(tag, setting));
-      return item;
+      const more = setting && mayWrite ? [" ", this.#acceptButton(tag, setting)] : [];
+      return line(said(hint, hint_phrase), ...more);
     }));
   }
 
   /** @param {string} tag @param {Record<string, string | boolean>} setting */
   #acceptButton(tag, setting) {
     const what = t("care.accepted", { tag, setting: settingText(setting) });
-    const button = Object.assign(document.createElement("button"), { type: "button", className: "accept", textContent: t("care.accept", { setting: settingText(setting) }) });
-    button.addEventListener("click", () => this.#accept(what, `tags/${encodeURIComponent(tag)}/settings`, setting));
-    return button;
+    const path = `tags/${encodeURIComponent(tag)}/settings`;
+    return button(t("care.accept", { setting: settingText(setting) }), null, () => this.#accept(what, path, setting), "accept");
   }
 
   /** @param {string} what @param {string} path @param {Record<string, string | boolean>} setting */
@@ -199,11 +198,9 @@ export class Detail {
 }
 
 function hypothesisLine() {
-  const line = document.createElement("li");
   const bar = document.createElement("meter");
   bar.setAttribute("aria-label", t("tag.hypothesis"));
-  line.append(document.createElement("span"), bar, document.createElement("span"));
-  return line;
+  return line(document.createElement("span"), bar, document.createElement("span"));
 }
 
 /** @param {Element} line @param {import("../data/fleet.js").Hypothesis} ghost */
@@ -227,5 +224,5 @@ const settingText = (setting) => Object.entries(setting).map(([name, value]) => 
 function fillList(list, texts) {
   list.hidden = texts.length === 0;
   if (list.textContent === texts.join("")) return;
-  list.replaceChildren(...texts.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+  list.replaceChildren(...texts.map((text) => line(text)));
 }

@@ -6,6 +6,7 @@ import { count, duration, length, speed, tagCount, UNKNOWN } from "../data/forma
 import { isSi } from "../data/units.js";
 import { t } from "../i18n/language.js";
 import { partOf } from "../page/parts.js";
+import { button } from "../page/elements.js";
 
 const MAX_LINES = 500;
 const HEADS = ["table.tag", "figures.tracked", "figures.distance", "figures.mean", "figures.max"];
@@ -62,10 +63,8 @@ export class FiguresPanel {
     const names = zones.map(({ zone, name }) => (name === null ? t("figures.deleted_zone", { zone }) : name || zone));
     const cells = [...HEADS.map((key) => t(key)), ...names.map((name) => t("figures.in_zone", { name }))].map((text, at) => {
       const cell = document.createElement("th");
-      const button = Object.assign(document.createElement("button"), { type: "button", textContent: text });
-      button.addEventListener("click", () => this.#order(at - 1));
       cell.scope = "col";
-      cell.append(button);
+      cell.append(button(text, null, () => this.#order(at - 1), ""));
       return cell;
     });
     partOf(this.dialog, "head").replaceChildren(...cells);

@@ -8,6 +8,7 @@ import { keepLines } from "../alerts/lines.js";
 import { t, timeText } from "../i18n/language.js";
 import { partOf, write } from "../page/parts.js";
 import { Plot } from "./plot.js";
+import { button, line } from "../page/elements.js";
 
 const MOST_STOPS = 100;
 /** Names of what is known, and the states whose colours stand for it. */
@@ -63,13 +64,9 @@ export class Lane {
 
   /** @param {Period} stop */
   #line({ from_ms, to_ms }) {
-    const line = document.createElement("li");
-    const button = Object.assign(document.createElement("button"), { type: "button", className: "text" });
     const clock = (/** @type {number} */ time_ms) => timeText(time_ms, { hour: "2-digit", minute: "2-digit" });
-    button.textContent = t("lane.stop", { from: clock(from_ms), to: clock(to_ms), time: age((to_ms - from_ms) / 1000) });
-    button.addEventListener("click", () => this.replay.seek(from_ms));
-    line.append(button);
-    return line;
+    const text = t("lane.stop", { from: clock(from_ms), to: clock(to_ms), time: age((to_ms - from_ms) / 1000) });
+    return line(button(text, null, () => this.replay.seek(from_ms)));
   }
 }
 

@@ -11,6 +11,7 @@ import { t, timeText } from "../i18n/language.js";
 import { refusal, said } from "../i18n/said.js";
 import { partOf } from "../page/parts.js";
 import { WhatIf } from "./what_if.js";
+import { button, line } from "../page/elements.js";
 
 const BEFORE_MS = 120_000;
 const DAY_MS = 86_400_000;
@@ -66,7 +67,7 @@ export class Then {
   }
 
   /** @param {{causes: Cause[]}} past @returns {(string | Node)[][]} */
-  #causes = ({ causes }) => causes.map((cause) => [said(cause.text, cause.phrase), " ", button(t("whatif.so"), () => this.whatIf.offer(cause))]);
+  #causes = ({ causes }) => causes.map((cause) => [said(cause.text, cause.phrase), " ", button(t("whatif.so"), null, () => this.whatIf.offer(cause))]);
 
   /** @param {number} at_ms */
   async #explanation(at_ms) {
@@ -89,17 +90,16 @@ export class Then {
 
   /** @param {Entry} entry */
   #change(entry) {
-    const line = document.createElement("li");
     const text = t("then.change", {
       time: timeOf(entry.t_ns),
       who: entry.by.name || t(`trail.by_${entry.by.source}`),
       item: entry.item,
       what: differences(entry.before ?? {}, entry.after ?? {}).map(([name, before, after]) => `${name}: ${JSON.stringify(before) ?? "–"} → ${JSON.stringify(after) ?? "–"}`).join(", "),
     });
-    line.append(button(text, () => this.replay.seek(entry.t_ns / 1e6)));
+    const made = line(button(text, null, () => this.replay.seek(entry.t_ns / 1e6)));
     const other = withoutIt(entry);
-    if (other) line.append(" ", button(t("whatif.not"), () => this.whatIf.run(other, entry.t_ns / 1e6 - 1000)));
-    return line;
+    if (other) made.append(" ", button(t("whatif.not"), null, () => this.whatIf.run(other, entry.t_ns / 1e6 - 1000)));
+    return made;
   }
 
   async #save() {
@@ -117,11 +117,7 @@ export class Then {
   #say(text, lines) {
     if (text === "") this.#asked = "";
     partOf(this.box, "answer").textContent = text;
-    partOf(this.box, "lines").replaceChildren(...lines.map((line) => {
-      const item = document.createElement("li");
-      item.append(...[line].flat());
-      return item;
-    }));
+    partOf(this.box, "lines").replaceChildren(...lines.map((parts) => line(...[parts].flat())));
     partOf(this.box, "lines").hidden = lines.length === 0;
   }
 }
@@ -131,13 +127,6 @@ function withoutIt({ kind, before, after }) {
   if (before === null || after === null || kind === "site") return null;
   if (kind === "anchor") return { anchors: [before] };
   return { settings: Object.fromEntries(differences(before, after).map(([name, value]) => [name, value ?? null])) };
-}
-
-/** @param {string} text @param {() => void} act */
-function button(text, act) {
-  const made = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: text });
-  made.addEventListener("click", act);
-  return made;
 }
 
 /** @param {{state: string, reason: string}} pose */

@@ -3,6 +3,7 @@
 import { length } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { said } from "../i18n/said.js";
+import { element, line } from "../page/elements.js";
 
 /** @typedef {import("../data/evidence.js").Explanation} Explanation */
 
@@ -30,13 +31,8 @@ function sharesOf({ pose }) {
 
 /** @param {string} name @param {number} share @param {number} part_m */
 function lineOf(name, share, part_m) {
-  const line = document.createElement("li");
   const title = t(`part.${name}`);
   const bar = Object.assign(document.createElement("meter"), { value: share, textContent: length(part_m) });
   bar.setAttribute("aria-label", title);
-  line.append(span(title), bar, span(`± ${length(part_m)}`));
-  return line;
+  return line(element("span", title), bar, element("span", `± ${length(part_m)}`));
 }
-
-/** @param {string} text */
-const span = (text) => Object.assign(document.createElement("span"), { textContent: text });

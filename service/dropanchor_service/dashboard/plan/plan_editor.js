@@ -4,7 +4,7 @@ import { boundsAround } from "../map/view.js";
 import { DraftSteps } from "../data/draft_steps.js";
 import { Saving } from "../data/saving.js";
 import { newId } from "../zones/editor.js";
-import { toCentimetre } from "../setup/gestures.js";
+import { stepOf, toCentimetre } from "../setup/gestures.js";
 import { newName } from "./plan_name.js";
 import { pathOf } from "./plan_store.js";
 import { t } from "../i18n/language.js";
@@ -17,12 +17,9 @@ import { aligned, cornersOf, inMiddleOf, isInside, isPlaced, pixelOf } from "./t
  * the plan, or say where that is */
 
 const SNAP_PX = 18;
-const STEP_M = 0.1;
-const LARGE_STEP_M = 1;
 const PADDING_PX = 48;
 const MIN_SIDE_M = 0.1;
 const MAX_POINTS = 20;
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /** Event: "change". */
 export class PlanEditor extends EventTarget {
@@ -204,11 +201,10 @@ export class PlanEditor extends EventTarget {
 
   /** @param {KeyboardEvent} event */
   key(event) {
-    const direction = ARROWS[/** @type {keyof typeof ARROWS} */ (event.key)];
-    if (!this.draft || this.mode !== "move" || !direction) return false;
-    const step = event.shiftKey ? LARGE_STEP_M : STEP_M;
+    const step = stepOf(event);
+    if (!this.draft || this.mode !== "move" || !step) return false;
     const { x, y } = this.draft.placement;
-    this.#moveTo(x + step * direction[0], y + step * direction[1], "arrows");
+    this.#moveTo(x + step[0], y + step[1], "arrows");
     return true;
   }
 

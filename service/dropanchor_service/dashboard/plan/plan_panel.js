@@ -8,6 +8,7 @@ import { readMeasure, writeMeasure } from "../data/units.js";
 import { t } from "../i18n/language.js";
 import { begun, refusal } from "../i18n/said.js";
 import { fieldOf, instead, numberOf, partOf, writeOrHide } from "../page/parts.js";
+import { button, line } from "../page/elements.js";
 
 const DEGREES = 180 / Math.PI;
 
@@ -72,12 +73,10 @@ export class PlanPanel {
     if (this.list.dataset.shown === shown) return;
     this.list.dataset.shown = shown;
     this.list.replaceChildren(...store.plans.map(({ id }, i) => {
-      const button = Object.assign(document.createElement("button"), { type: "button", textContent: texts[i] });
-      button.dataset.plan = id;
-      button.setAttribute("aria-pressed", String(id === draft?.id));
-      const line = document.createElement("li");
-      line.append(button);
-      return line;
+      const choose = button(texts[i], null, () => {}, "");
+      choose.dataset.plan = id;
+      choose.setAttribute("aria-pressed", String(id === draft?.id));
+      return line(choose);
     }));
   }
 

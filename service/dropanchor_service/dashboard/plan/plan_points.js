@@ -6,6 +6,7 @@ import { t } from "../i18n/language.js";
 import { toCentimetre } from "../setup/gestures.js";
 import { latLonIn, siteOfLatLon } from "./geodesy.js";
 import { isPlaced, residuals } from "./transform.js";
+import { button, element, line } from "../page/elements.js";
 
 /** Fewer points always fit exactly, so that their residuals say nothing. */
 const RESIDUALS_FROM = 3;
@@ -38,16 +39,12 @@ export class PlanPoints {
 
   /** @param {number} index */
   #line(index) {
-    const line = document.createElement("li");
-    const name = Object.assign(document.createElement("span"), { textContent: `${index + 1}` });
     const [x, y] = ["x", "y"].map((axis) => Object.assign(document.createElement("input"), { type: "number", step: "any", placeholder: `${axis} ${units.length.symbol}`, ariaLabel: t("plans.point_axis", { number: index + 1, axis, unit: units.length.symbol }) }));
     for (const field of [x, y]) field.dataset.measure = "length";
     for (const field of [x, y]) field.addEventListener("input", () => this.editor.placePoint(index, readMeasure(x), readMeasure(y)));
     const off = document.createElement("small");
-    const remove = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: t("plans.remove"), ariaLabel: t("plans.remove_one", { number: index + 1 }) });
-    remove.addEventListener("click", () => this.editor.removePoint(index));
-    line.append(name, x, y, this.#anchors(index), off, remove, this.#latLon(index));
-    return line;
+    const remove = button(t("plans.remove"), t("plans.remove_one", { number: index + 1 }), () => this.editor.removePoint(index));
+    return line(element("span", `${index + 1}`), x, y, this.#anchors(index), off, remove, this.#latLon(index));
   }
 
   /** Return a field for latitude and longitude. @param {number} index */

@@ -7,6 +7,7 @@ import { nameKey } from "../data/order.js";
 import { readMeasure, writeMeasure } from "../data/units.js";
 import { confirmed } from "./confirm.js";
 import { fieldOf, instead, partOf } from "../page/parts.js";
+import { button, line } from "../page/elements.js";
 
 const FIELDS = /** @type {const} */ (["x", "y", "z"]);
 
@@ -82,12 +83,10 @@ export class AnchorPanel {
     this.list.dataset.shown = shown;
     const focused = /** @type {HTMLElement | null} */ (document.activeElement)?.dataset.anchor;
     this.list.replaceChildren(...anchors.map(({ id }, i) => {
-      const button = Object.assign(document.createElement("button"), { type: "button", textContent: texts[i] });
-      button.dataset.anchor = id;
-      button.setAttribute("aria-pressed", String(!isNew && id === draft?.id));
-      const line = document.createElement("li");
-      line.append(button);
-      return line;
+      const choose = button(texts[i], null, () => {}, "");
+      choose.dataset.anchor = id;
+      choose.setAttribute("aria-pressed", String(!isNew && id === draft?.id));
+      return line(choose);
     }));
     for (const button of this.list.querySelectorAll("button")) if (button.dataset.anchor === focused) button.focus();
   }

@@ -1,6 +1,6 @@
 /** Place, move, add and delete anchors. A draft is on the map only until it is saved or cancelled: moving an anchor moves tags. */
 
-import { toCentimetre } from "./gestures.js";
+import { stepOf, toCentimetre } from "./gestures.js";
 import { t } from "../i18n/language.js";
 
 /** @typedef {import("../map/draw_site.js").Anchor} Anchor */
@@ -8,9 +8,6 @@ import { t } from "../i18n/language.js";
 
 const REACH_PX = 18;
 const DRAG_PX = 4;
-const STEP_M = 0.1;
-const LARGE_STEP_M = 1;
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /** @param {string} id */
 const pathOf = (id) => `anchors/${encodeURIComponent(id)}`;
@@ -162,12 +159,11 @@ export class AnchorEditor extends EventTarget {
 
   /** @param {KeyboardEvent} event */
   key(event) {
-    const direction = ARROWS[/** @type {keyof typeof ARROWS} */ (event.key)];
+    const step = stepOf(event);
     if (!this.draft || !this.isOpen) return false;
     if (event.key === "Enter") this.save();
-    if (!direction) return event.key === "Enter";
-    const step = event.shiftKey ? LARGE_STEP_M : STEP_M;
-    this.change({ x: toCentimetre(this.draft.x + step * direction[0]), y: toCentimetre(this.draft.y + step * direction[1]) });
+    if (!step) return event.key === "Enter";
+    this.change({ x: toCentimetre(this.draft.x + step[0]), y: toCentimetre(this.draft.y + step[1]) });
     return true;
   }
 

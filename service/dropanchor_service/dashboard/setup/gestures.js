@@ -50,5 +50,12 @@ export function giveTo(map, tools) {
   }, capture);
 }
 
+const STEP_M = 0.1;
+const LARGE_STEP_M = 1;
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+
+/** Return by how much an arrow key moves what is edited, m; undefined for another key. @param {KeyboardEvent} event */
+export const stepOf = ({ key, shiftKey }) => ARROWS[/** @type {keyof typeof ARROWS} */ (key)]?.map((way) => way * (shiftKey ? LARGE_STEP_M : STEP_M));
+
 /** @param {number} metres */
 export const toCentimetre = (metres) => Math.round(metres * 100) / 100;

@@ -4,6 +4,7 @@ import { ChangedMeanwhileError } from "../data/access.js";
 import { sentence } from "../data/changes.js";
 import { UNDO_MS } from "../data/undo.js";
 import { t } from "../i18n/language.js";
+import { button, element } from "../page/elements.js";
 
 /** @typedef {import("../data/undo.js").Step} Step @typedef {[string, () => void]} Choice */
 
@@ -54,13 +55,8 @@ export class Outcome {
   #show(text, choices, step = null) {
     clearTimeout(this.#timer);
     const hadFocus = this.box.contains(document.activeElement);
-    const message = Object.assign(document.createElement("span"), { textContent: text });
-    const buttons = [...choices, /** @type {Choice} */ ([t("close"), () => this.#clear()])].map(([label, act]) => {
-      const button = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: label });
-      button.addEventListener("click", act);
-      return button;
-    });
-    this.box.replaceChildren(message, ...buttons);
+    const buttons = [...choices, /** @type {Choice} */ ([t("close"), () => this.#clear()])].map(([label, act]) => button(label, null, act));
+    this.box.replaceChildren(element("span", text), ...buttons);
     this.box.classList.remove("above");
     this.box.classList.toggle("above", isOver(this.box, document.activeElement));
     if (hadFocus) buttons[0].focus();

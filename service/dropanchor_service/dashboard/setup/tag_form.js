@@ -1,6 +1,6 @@
 /** The form of the settings of a tag, made of the model that validates them: fill it, and read it. */
 
-import { element } from "../alerts/lines.js";
+import { element } from "../page/elements.js";
 import { api, getJson } from "../data/connection.js";
 import { sourceOf } from "../data/trail.js";
 import { has, t } from "../i18n/language.js";

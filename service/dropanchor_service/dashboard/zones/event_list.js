@@ -4,6 +4,7 @@ import { retractedBy } from "./event_log.js";
 import { clock, fullTime, probability, sentence, why } from "./words.js";
 import { t } from "../i18n/language.js";
 import { write, writeOrHide } from "../page/parts.js";
+import { button, element, line } from "../page/elements.js";
 
 /** @typedef {import("./words.js").ServiceEvent} ServiceEvent */
 
@@ -56,19 +57,13 @@ export class EventList {
 
   /** @param {ServiceEvent} event */
   #line(event) {
-    const line = document.createElement("li");
-    const button = element("button", "");
     const time = /** @type {HTMLTimeElement} */ (element("time", clock(event)));
     time.dateTime = event.time;
     time.title = fullTime(event.time);
-    button.setAttribute("type", "button");
-    button.append(element("span", sentence(event)), " ", time, " ", element("small", probability(event)));
-    button.addEventListener("click", () => this.pick(event));
-    line.append(button);
-    this.#lines.set(event.sequence, line);
-    return line;
+    const pick = button("", null, () => this.pick(event), "");
+    pick.append(element("span", sentence(event)), " ", time, " ", element("small", probability(event)));
+    const made = line(pick);
+    this.#lines.set(event.sequence, made);
+    return made;
   }
 }
-
-/** @param {string} name @param {string} text */
-const element = (name, text) => Object.assign(document.createElement(name), { textContent: text });

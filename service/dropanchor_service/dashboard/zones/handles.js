@@ -3,12 +3,10 @@
 import { length } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { handlesOf, movedTo, withoutCorner } from "./shape_edit.js";
+import { stepOf } from "../setup/gestures.js";
 
 /** @typedef {import("./shape_edit.js").Handle} Handle */
 
-const STEP_M = 0.1;
-const LARGE_STEP_M = 1;
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 export class Handles {
   /** @type {HTMLButtonElement[]} */
@@ -129,9 +127,8 @@ export class Handles {
   /** @param {number} number @param {KeyboardEvent} event */
   #key(number, event) {
     const { kind, index, x, y } = this.#handles[number];
-    const arrow = ARROWS[/** @type {keyof typeof ARROWS} */ (event.key)];
-    const step = event.shiftKey ? LARGE_STEP_M : STEP_M;
-    if (arrow && kind !== "edge") this.#move(number, x + step * arrow[0], y + step * arrow[1], `arrows ${kind} ${index}`);
+    const step = stepOf(event);
+    if (step && kind !== "edge") this.#move(number, x + step[0], y + step[1], `arrows ${kind} ${index}`);
     else if (kind === "corner" && (event.key === "Delete" || event.key === "Backspace")) this.#remove(index);
     else return;
     event.preventDefault();

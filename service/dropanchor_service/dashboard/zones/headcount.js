@@ -4,6 +4,7 @@ import { api, getJson } from "../data/connection.js";
 import { partOf, write } from "../page/parts.js";
 import { clock } from "./words.js";
 import { t, timeText } from "../i18n/language.js";
+import { button, line } from "../page/elements.js";
 
 /** @typedef {{tag: string, since_ns: number}} Occupant */
 /** @typedef {{tag: string, label: string, note: string}} Line note: since when it is there, and its state unless that is good */
@@ -73,13 +74,10 @@ export class Headcount {
 
   /** @param {Line} line */
   #item({ tag, label, note }) {
-    const button = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: label });
-    button.addEventListener("click", () => {
+    const choose = button(label, null, () => {
       this.dialog.close();
       this.selectTag(tag);
     });
-    const item = document.createElement("li");
-    item.append(button, " ", note);
-    return item;
+    return line(choose, " ", note);
   }
 }

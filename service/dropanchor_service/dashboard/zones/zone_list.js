@@ -2,6 +2,7 @@
 
 import { count, t } from "../i18n/language.js";
 import { write } from "../page/parts.js";
+import { button, line } from "../page/elements.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone */
 
@@ -37,24 +38,11 @@ export class ZoneList {
 
   /** @param {Zone} zone */
   #line({ id, name, colour }) {
-    const line = document.createElement("li");
     const swatch = document.createElement("i");
     swatch.style.backgroundColor = colour;
-    const choose = this.#button("choose", name || id, () => this.act.select(id));
+    const choose = button(name || id, null, () => this.act.select(id), "choose");
     choose.prepend(swatch);
-    line.append(choose, this.#button("text", "", () => this.act.count(id)));
-    if (this.store.mayWrite) {
-      const edit = this.#button("text", t("zones.edit"), () => this.act.edit(id));
-      edit.setAttribute("aria-label", t("zones.edit_one", { zone: name || id }));
-      line.append(edit);
-    }
-    return line;
-  }
-
-  /** @param {string} className @param {string} textContent @param {() => void} act */
-  #button(className, textContent, act) {
-    const button = Object.assign(document.createElement("button"), { type: "button", className, textContent });
-    button.addEventListener("click", act);
-    return button;
+    const edit = this.store.mayWrite ? [button(t("zones.edit"), t("zones.edit_one", { zone: name || id }), () => this.act.edit(id))] : [];
+    return line(choose, button("", null, () => this.act.count(id)), ...edit);
   }
 }
