@@ -166,7 +166,7 @@ def is_let_in(links: ShareLinks, token: str) -> bool:
 
 def has_cart(tracks: Tracks) -> bool:
     try:
-        return tracks.has_tag("cart")
+        return tracks.reader.has_tag("cart")
     except HistoryError:  # the file is good, but SQLite cannot use it in a folder that is read-only
         return False
 

@@ -25,7 +25,7 @@ def many_tracks(
 
     Raises HistoryError and TooMuchError.
     """
-    found = tracks.overview(tags, from_ns, to_ns, max_points)
+    found = tracks.reader.overview(tags, from_ns, to_ns, max_points)
     columns = _columns(found.points, floors)
     begins = np.searchsorted(found.points["tag"], found.figures["tag"])
     ends = np.searchsorted(found.points["tag"], found.figures["tag"], side="right")

@@ -44,7 +44,7 @@ class TrackPage:
 
 def track_page(tracks: Tracks, site: SiteStore, tag: str, from_ns: int, to_ns: int, limit: int) -> TrackPage:
     """Return the first `limit` poses from `from_ns` to `to_ns`, both included. Raises HistoryError."""
-    found = tracks.poses(tag, from_ns, to_ns, limit + 1)
+    found = tracks.reader.poses(tag, from_ns, to_ns, limit + 1)
     next_ns = int(found.poses["t_ns"][limit]) if len(found.poses) > limit else None
     return TrackPage(_columns(found.first(limit), site), next_ns)
 
@@ -55,9 +55,9 @@ def pose_in_tracks(tracks: Tracks, site: SiteStore, tag: str, memory: Array, t_n
     memory: POSE that may not have been written to disk yet. Raises NoPoseThenError.
     """
     try:
-        before = tracks.poses(tag, max(0, t_ns - FAR_NS), t_ns, 1, newest_first=True)
-        after = tracks.poses(tag, t_ns, t_ns + FAR_NS, 1)
-        if len(memory) == len(before.poses) == len(after.poses) == 0 and not tracks.has_tag(tag):
+        before = tracks.reader.poses(tag, max(0, t_ns - FAR_NS), t_ns, 1, newest_first=True)
+        after = tracks.reader.poses(tag, t_ns, t_ns + FAR_NS, 1)
+        if len(memory) == len(before.poses) == len(after.poses) == 0 and not tracks.reader.has_tag(tag):
             return None
     except HistoryError as error:
         raise NoPoseThenError(f"the history cannot be read ({error})") from error

@@ -5,10 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dropanchor_service.estimation.columns import POSE, Array
-from dropanchor_service.history.coverage import Coverage
-from dropanchor_service.history.heat_map import HeatMap
-from dropanchor_service.history.overview import Overview
-from dropanchor_service.history.records import StoredPoses
+from dropanchor_service.history.reader import TrackReader
 from dropanchor_service.history.storage import Retention, Storage, Usage
 from dropanchor_service.runtime.background_writer import BackgroundWriter
 from dropanchor_service.store.site import SiteStore
@@ -19,9 +16,9 @@ MAX_QUEUED_BYTES = 64 * 2**20
 
 
 class Tracks:
-    """The stored tracks. The ingest thread calls `offer`, any thread calls `poses`.
+    """The stored tracks. The ingest thread calls `offer`, any thread reads.
 
-    A background thread writes while this context manager is open. What reads raises HistoryError.
+    A background thread writes while this context manager is open.
     """
 
     def __init__(self, storage: Storage, retention: Retention, tags: TagTable, site: SiteStore) -> None:
@@ -52,39 +49,10 @@ class Tracks:
         if len(kept):
             self.writer.put(kept, kept.nbytes, len(kept))
 
-    def poses(self, tag: str, from_ns: int, to_ns: int, limit: int, newest_first: bool = False) -> StoredPoses:
-        """Return up to `limit` poses of the tag between the two times."""
-        return self._storage.reader.poses(tag, from_ns, to_ns, limit, newest_first)
-
-    def overview(self, tags: Sequence[str] | None, from_ns: int, to_ns: int, max_points: int) -> Overview:
-        """Return the figures of these tags, or of all, and at most `max_points` points of each.
-
-        Raises TooMuchError too.
-        """
-        return self._storage.reader.overview(tags, from_ns, to_ns, max_points)
-
-    def heat_map(self, tags: Sequence[str] | None, from_ns: int, to_ns: int, cell_m: float) -> HeatMap:
-        """Return where these tags, or all, were, in squares of at least `cell_m`.
-
-        Raises TooMuchError too.
-        """
-        return self._storage.reader.heat_map(tags, from_ns, to_ns, cell_m)
-
-    def tags(self) -> list[str]:
-        """Return all tags of which poses were ever stored."""
-        return self._storage.reader.tags()
-
-    def span(self) -> tuple[int, int] | None:
-        """Return the time that the stored poses cover, ns; None without poses."""
-        return self._storage.reader.span()
-
-    def coverage(self, from_ns: int, to_ns: int, max_parts: int) -> Coverage:
-        """Return when there are poses between the two times, in at most `max_parts` equal parts."""
-        return self._storage.reader.coverage(from_ns, to_ns, max_parts)
-
-    def has_tag(self, tag: str) -> bool:
-        """Return whether poses of this tag were ever stored."""
-        return self._storage.reader.has_tag(tag)
+    @property
+    def reader(self) -> TrackReader:
+        """What reads the stored poses, in any thread. Raises HistoryError."""
+        return self._storage.reader
 
     @property
     def usage(self) -> Usage:

@@ -38,7 +38,7 @@ def write(tracks: Tracks, *times_s: int) -> bool:
 
 
 def times(tracks: Tracks) -> list[int]:
-    return [(t_ns - T_NS) // SECOND for t_ns in tracks.poses("a", 0, 2**62, 1000).poses["t_ns"].tolist()]
+    return [(t_ns - T_NS) // SECOND for t_ns in tracks.reader.poses("a", 0, 2**62, 1000).poses["t_ns"].tolist()]
 
 
 def damage_first_page(file: Path) -> None:

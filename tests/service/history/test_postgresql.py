@@ -61,7 +61,7 @@ def write(tracks: Tracks, *times_ns: int) -> bool:
 
 
 def times(tracks: Tracks) -> list[int]:
-    return [int(t_ns) for t_ns in tracks.poses("a", 0, 2**62, 1000).poses["t_ns"]]
+    return [int(t_ns) for t_ns in tracks.reader.poses("a", 0, 2**62, 1000).poses["t_ns"]]
 
 
 def count_rows(postgresql: Postgresql, url: str, table: str) -> int:
@@ -181,7 +181,7 @@ def test_whole_days_are_dropped_by_age_and_by_size(url: str, postgresql: Postgre
         tracks = tracks_in(database, Retention(1, 0, 0, 5 * DAY_NS, 1))
         assert write(tracks)
         assert times(tracks) == days[3:]
-        assert tracks.span() == (days[3], days[3] + 10 * SECOND)
+        assert tracks.reader.span() == (days[3], days[3] + 10 * SECOND)
     tables = postgresql.run(url, "SELECT relname FROM pg_class WHERE relname ~ '_[0-9]{8}$' AND relkind = 'r'")
     assert len(tables) == 3
 
@@ -299,7 +299,7 @@ def test_a_history_of_a_later_version_is_refused_and_not_changed(
     assert not write(tracks, NOW_NS + SECOND)
     assert tracks.problems[0].endswith(refusal)
     with pytest.raises(HistoryError, match="schema 99"):
-        tracks.span()
+        tracks.reader.span()
     assert count_rows(postgresql, url, "poses") == 1
 
 

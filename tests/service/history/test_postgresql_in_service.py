@@ -103,7 +103,7 @@ def test_the_sites_of_a_service_share_a_database_without_a_data_folder(postgresq
         folders.observers.poses(poses)
         tracks = [one.tracks for one in folders.all if one.tracks is not None]
         assert [one.writer.flush() for one in tracks] == [True, True]
-        assert [one.poses("cart", 0, 2 * T_NS, 9).poses["x"].tolist() for one in tracks] == [[1.0], [2.0]]
+        assert [one.reader.poses("cart", 0, 2 * T_NS, 9).poses["x"].tolist() for one in tracks] == [[1.0], [2.0]]
         assert len({id(one.usage) for one in tracks}) == 1
         assert f"dropanchor_history_bytes {float(tracks[0].usage.bytes)}" in generate_latest(metrics.registry).decode()
     of_sites = "dropanchor_history.poses JOIN dropanchor_history.sites ON id = site"

@@ -66,7 +66,7 @@ def _coverage(tracks: Tracks, query: CoverageQuery) -> dict[str, Any]:
     """Return the answer. Raises HistoryError and ProblemError."""
     if query.from_ns is not None and query.to_ns is not None:
         require_order(query.from_ns, query.to_ns)
-    oldest, newest = tracks.span() or (None, None)
+    oldest, newest = tracks.reader.span() or (None, None)
     from_ns = oldest if query.from_ns is None else query.from_ns
     to_ns = newest if query.to_ns is None else query.to_ns
     found = NO_COVERAGE
@@ -74,6 +74,6 @@ def _coverage(tracks: Tracks, query: CoverageQuery) -> dict[str, Any]:
         if query.from_ns is None:  # the period that is asked for may lie before the first pose or after the last one
             from_ns = min(from_ns, to_ns)
         to_ns = max(from_ns, to_ns)
-        found = tracks.coverage(from_ns, to_ns, query.max_parts)
+        found = tracks.reader.coverage(from_ns, to_ns, query.max_parts)
     stretches = [{"from_ns": start, "to_ns": end} for start, end in found.stretches]
     return {"from_ns": from_ns, "to_ns": to_ns, "step_ns": found.step_ns, "stretches": stretches}

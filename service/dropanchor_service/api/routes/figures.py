@@ -91,7 +91,7 @@ def _figures(answers: Answers, events: EventParts, query: FiguresQuery) -> dict[
     from_ns, to_ns = limits_of(query, answers.now_ns())
     tracks = history_of(answers)
     with reading_history():
-        overview = tracks.overview(selected_tags(answers, tracks, query), from_ns, to_ns, 2)
+        overview = tracks.reader.overview(selected_tags(answers, tracks, query), from_ns, to_ns, 2)
     with reading():
         times = times_in_zones(events.store.database, from_ns, to_ns, _last_known_ns(overview))
     each = {overview.names[int(row["tag"])]: figures_of(row) for row in overview.figures}

@@ -64,7 +64,7 @@ def get_heat_map(query: Annotated[HeatMapQuery, Query()], request: Request) -> R
 
 
 def _heat_map(tracks: Tracks, tags: list[str] | None, from_ns: int, to_ns: int, cell_m: float) -> dict[str, Any]:
-    found = tracks.heat_map(tags, from_ns, to_ns, cell_m)
+    found = tracks.reader.heat_map(tags, from_ns, to_ns, cell_m)
     seconds = np.round(found.seconds, 3)
     return {
         "from_ns": from_ns,

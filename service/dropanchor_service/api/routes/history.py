@@ -27,6 +27,6 @@ def get_history(request: Request) -> Response:
     if answers.tracks is None:
         return json_response({"enabled": False, "from_ns": None, "to_ns": None})
     with reading_history():
-        span = answers.tracks.span()
+        span = answers.tracks.reader.span()
     from_ns, to_ns = (None, None) if span is None else span
     return json_response({"enabled": True, "from_ns": from_ns, "to_ns": to_ns})

@@ -61,7 +61,7 @@ def selected_tags(answers: Answers, tracks: Tracks, query: TagsInPeriod) -> list
     """Return the tags that the query names, None for all. Raises HistoryError."""
     if not query.group:
         return query.tags or None
-    return query.of_names(answers, query.tags or tracks.tags())
+    return query.of_names(answers, query.tags or tracks.reader.tags())
 
 
 def limits_of(period: Period, now_ns: int) -> tuple[int, int]:
@@ -93,7 +93,7 @@ def history_of(answers: Answers) -> Tracks:
 
 def require_known(answers: Answers, tracks: Tracks, tag: str) -> None:
     """Raise ProblemError when neither this process nor the stored history has seen the tag."""
-    if answers.tags.find(tag) is None and not tracks.has_tag(tag):
+    if answers.tags.find(tag) is None and not tracks.reader.has_tag(tag):
         raise unknown_tag(tag)
 
 
