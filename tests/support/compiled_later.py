@@ -54,7 +54,7 @@ def _send(bench: IngestBench, messages: list[Message]) -> None:
 def _answer(bench: IngestBench) -> None:
     answers = Answers(bench.site, bench.tags, bench.latest)
     b"".join(answers.pose_list_json())
-    answers.pose_of(bench.tags.at(0))
+    answers.pose_of(bench.tags.rows.at(0))
     answers.frame_of(answers.rows(), answers.now_ns())
 
 

@@ -62,10 +62,10 @@ def columns_of(
     poses: POSE, of rows in `tags`. historical: the poses are for their own time, so they are not aged. names: the
     tags of the poses, if they may have no row.
     """
-    age_s = (now_ns - poses["t_ns"]) * 1e-9 if historical else tags.age_s(poses, now_ns)
+    age_s = (now_ns - poses["t_ns"]) * 1e-9 if historical else tags.rows.age_s(poses, now_ns)
     aged = poses if historical else aged_poses(poses, tags.rows.overdue_s(poses, now_ns))
     if names is None:
-        of_tags, online = tags.names(aged["row"].tolist()), tags.presence.are_online(aged["row"])
+        of_tags, online = tags.rows.names(aged["row"].tolist()), tags.presence.are_online(aged["row"])
     else:
         of_tags, online = list(names), np.array([tags.presence.is_online(name) for name in names])
     published = in_site_frame(aged)

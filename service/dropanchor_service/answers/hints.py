@@ -182,7 +182,7 @@ def _about_missing(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[
     reasons, placed = poses["reason"][places], np.isfinite(poses["x"][places])
     yield RANGES_COME, places[placed & ranges & np.isin(reasons, _NO_RANGES)]
     yield MOTION_COMES, places[placed & motion & np.isin(reasons, _NO_MOTION)]
-    samples = tags.counts(poses["row"][places])["samples"]
+    samples = tags.rows.counts(poses["row"][places])["samples"]
     counts = np.column_stack([samples[:, _RANGE], samples[:, _IMU] + samples[:, _HEADING]])
     begins = ~placed & (counts > 0).all(axis=1)
     ahead_s = (arrivals["motion_ns"] - arrivals["range_ns"]) * 1e-9  # both may end, one a moment before the other
@@ -206,7 +206,7 @@ def _without_floor(poses: Array, site: SiteStore, tags: TagTable, hint: Array) -
     if not site.floors.names:
         return []
     places = np.flatnonzero((poses["z_source"] == HeightSource.START) & (hint == StateReason.RESOLVED))
-    samples = tags.counts(poses["row"][places])["samples"] if len(places) else np.zeros((0, len(KINDS)))
+    samples = tags.rows.counts(poses["row"][places])["samples"] if len(places) else np.zeros((0, len(KINDS)))
     places = places[samples[:, _PRESSURE] > 0]
     return [(HEIGHT_UNTOLD, places)] if len(places) else []
 
@@ -224,12 +224,12 @@ def _mounts(poses: Array, site: SiteStore, tags: TagTable) -> list[tuple[str, Ar
     places = np.flatnonzero(np.isin(poses["reason"], (StateReason.UNCERTAIN, StateReason.SEVERAL_MODES)))
     if not len(places):
         return []
-    samples = tags.counts(poses["row"][places])["samples"]
+    samples = tags.rows.counts(poses["row"][places])["samples"]
     several = poses["reason"][places] == StateReason.SEVERAL_MODES
     long = (samples[:, _RANGE] >= FORWARD_RANGES) & (samples[:, _IMU] >= FORWARD_IMU)
     alone = (samples[:, _IMU] > 0) & (samples[:, _HEADING] == 0) & (long | ~several)
     places, several = places[alone], several[alone]
-    settings = map(site.tag_settings, tags.names(poses["row"][places].tolist()))
+    settings = map(site.tag_settings, tags.rows.names(poses["row"][places].tolist()))
     unknown = np.array([tag.mount_angle_rad is None and tag.motion != "carried" for tag in settings], bool)
     hints = ((MOUNT_UNKNOWN, places[unknown & ~several]), (FORWARD_UNKNOWN, places[unknown & several]))
     return [(text, where) for text, where in hints if len(where)]

@@ -43,9 +43,9 @@ class PoseFilter:
             matching &= inside & (poses["frame"] == Frame.SITE)
         if self.text:
             text, rows = self.text.casefold(), np.flatnonzero(matching)
-            names = tags.names(poses["row"][rows].tolist())
+            names = tags.rows.names(poses["row"][rows].tolist())
             matching[rows] = [text in name.casefold() for name in names]
         if self.groups:
             rows = np.flatnonzero(matching)
-            matching[rows] = site.groups.are_in(tags.names(poses["row"][rows].tolist()), self.groups)
+            matching[rows] = site.groups.are_in(tags.rows.names(poses["row"][rows].tolist()), self.groups)
         return matching

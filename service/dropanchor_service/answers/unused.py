@@ -126,7 +126,7 @@ def hints_about_unused(rows: Array, tags: TagTable, now_ns: int) -> Iterator[tup
     unused = recent["screened"].astype(np.int64)
     unused[:, : len(KINDS)] += recent["unused"]
     arrived = np.column_stack([recent["samples"] + recent["screened"][:, : len(KINDS)], recent["messages"]])
-    sends = now_ns - tags.counts(rows[known])["last_heard_ns"] < STILL_NS
+    sends = now_ns - tags.rows.counts(rows[known])["last_heard_ns"] < STILL_NS
     most = sends[:, None] & (unused >= LEAST) & (2 * unused > arrived)
     for i in np.flatnonzero(most.any(axis=1)).tolist():
         what = int(np.where(most[i], unused[i], 0).argmax())

@@ -65,7 +65,7 @@ def _replay_session(arguments: argparse.Namespace, readers: Sequence[RecordingRe
     print(f"recorded {_utc(first.t_ns)}, {len(readers)} file(s), engine {settings.engine}")
     all_turns = tqdm(chain([first], turns), unit=" turns", unit_scale=True, desc="replayed", disable=None)
     for turn, poses in service.poses_of(all_turns):
-        tags = [service.tags.at(row).name for row in poses["row"].tolist()]
+        tags = [service.tags.rows.at(row).name for row in poses["row"].tolist()]
         outcome.add(turn, tags, poses)
         write(_rows(tags, poses))
     for line in [*outcome.lines(), *_findings(service), *_rejections(service, readers)]:

@@ -238,7 +238,7 @@ class SiteWatch:
         self._set(key, None)
 
     def _name_of(self, row: int) -> str:
-        return self._tags.at(row).name
+        return self._tags.rows.at(row).name
 
     def _happen(self, event: Draft) -> None:
         self.happened.append(event)

@@ -72,7 +72,7 @@ class Tracks:
     def _write(self, batches: Sequence[Array]) -> None:
         poses = np.concatenate([np.empty(0, POSE), *batches])
         anchors = [anchor.id for anchor in self._site.anchors_by_index()]
-        names = [self._tags.at(row).name for row in poses["row"].tolist()]
+        names = [self._tags.rows.at(row).name for row in poses["row"].tolist()]
         used = [anchors[index] if 0 <= index < len(anchors) else None for index in poses["anchor"].tolist()]
         self._storage.write(poses, names, used)
         self.written += len(poses)

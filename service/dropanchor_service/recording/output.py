@@ -175,7 +175,7 @@ class Output:
     def _topic(self, row: int, leaf: str) -> str:
         topic = self._topics.get((row, leaf))
         if topic is None:
-            topic = self._topics[row, leaf] = topic_of(self._tags.at(row).name, leaf)
+            topic = self._topics[row, leaf] = topic_of(self._tags.rows.at(row).name, leaf)
         return topic
 
     def _add_poses(self, file: McapFile, turn_ns: int, poses: Array) -> None:
@@ -185,7 +185,7 @@ class Output:
             anchor = anchors[index] if 0 <= index < len(anchors) else None
             try:
                 for topic, schema, message in pose_messages(
-                    pose, self._tags.at(pose["row"]).name, anchor, self._document
+                    pose, self._tags.rows.at(pose["row"]).name, anchor, self._document
                 ):
                     file.add(topic, schema, turn_ns, int(pose["t_ns"]), message)
                 self.written += 1

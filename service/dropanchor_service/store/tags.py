@@ -1,6 +1,5 @@
 """The tags of one site that have sent messages or are configured, by name."""
 
-from collections.abc import Sequence
 from threading import Lock
 
 from dropanchor_service.estimation.columns import Array
@@ -68,18 +67,3 @@ class TagTable:
     def is_deleted(self, row: int) -> bool:
         """Return whether the tag of this row was deleted and not registered again."""
         return row in self.rows.deleted
-
-    def at(self, row: int) -> Tag:
-        """Return the tag of this row. Raises IndexError when no tag has it."""
-        return self.rows.at(row)
-
-    def names(self, rows: Sequence[int]) -> list[str]:
-        return self.rows.names(rows)
-
-    def counts(self, row: int | Array) -> Array:
-        """Return the counters of one row, or of several."""
-        return self.rows.counts(row)
-
-    def age_s(self, poses: Array, now_ns: int) -> Array:
-        """Return the age of each POSE, s; see `Rows.age_s`."""
-        return self.rows.age_s(poses, now_ns)

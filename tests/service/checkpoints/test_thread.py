@@ -87,7 +87,7 @@ def test_poses_are_restored_after_a_restart_but_do_not_count_as_tracking(
     assert after.bench.x_of("ab") == [4.0, 5.0]
     assert after.bench.latest.since()[1]["state"].tolist() == [State.COASTING, State.COASTING]
     assert [tag.name for tag in after.bench.tags.all()] == ["a", "b"]
-    assert after.bench.tags.at(1).samples == {"range": 1}
+    assert after.bench.tags.rows.at(1).samples == {"range": 1}
     assert after.engine.configured == {0: [], 1: []}
 
 
@@ -97,7 +97,7 @@ def test_a_service_on_a_host_whose_clock_was_set_back_goes_on_from_the_time_of_t
     running.send("a", 4.0)
     wait_until(lambda: running.bench.x_of("a") == [4.0])
     running.stop()
-    heard_ns = running.bench.tags.at(0).last_heard_ns or 0
+    heard_ns = running.bench.tags.rows.at(0).last_heard_ns or 0
     monkeypatch.setattr(time, "time_ns", lambda: heard_ns - 9000 * 10**9)
     after = CheckpointBench(tmp_path)
     after.checkpoints.load()

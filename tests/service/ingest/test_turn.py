@@ -170,7 +170,7 @@ def test_a_name_a_colour_and_a_group_do_not_restart_a_tag_and_a_start_does() -> 
 def test_a_deleted_tag_is_back_with_its_next_message() -> None:
     bench = IngestBench()
     bench.send("a", ranges(1.0))
-    tag = bench.tags.at(0)
+    tag = bench.tags.rows.at(0)
     bench.tags.delete(0)
     assert (bench.tags.listed(), tag.messages) == ([], 0)
     bench.send("a", ranges(2.0))

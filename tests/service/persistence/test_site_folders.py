@@ -45,7 +45,9 @@ def test_poses_and_messages_reach_the_files_of_their_site_alone(tmp_path: Path) 
         found = []
         for one in folders.all:
             assert one.tracks is not None
-            found.append({tag: one.tracks.reader.poses(tag, 0, 2 * T, 9).poses["x"].tolist() for tag in one.tracks.reader.tags()})
+            found.append(
+                {tag: one.tracks.reader.poses(tag, 0, 2 * T, 9).poses["x"].tolist() for tag in one.tracks.reader.tags()}
+            )
         assert found == [{"cart": [1.0], "lift": [3.0]}, {"cart": [2.0]}]
     assert [one.recorder.files() != [] for one in folders.all if one.recorder] == [False, True]
     (file,) = (tmp_path / "sites" / "Lager%20S%C3%BCd" / "recordings").glob("*.mcap")

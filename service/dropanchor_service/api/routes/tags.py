@@ -202,7 +202,7 @@ def _statuses(
     configured = answers.site.tags
     for tag in tags:
         offset = offsets.get(tag.row)
-        first, last, messages, samples, rejected, *_ = answers.tags.counts(tag.row).item()
+        first, last, messages, samples, rejected, *_ = answers.tags.rows.counts(tag.row).item()
         yield {
             "tag": tag.name,
             "online": tag.online,

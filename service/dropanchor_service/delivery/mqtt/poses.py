@@ -175,7 +175,7 @@ class PosesFeed:
         self._held = dict.fromkeys(self._held, b"?")
 
     def _topics_of(self, rows: Array) -> list[str]:
-        return [self._topics.tag(tag) for tag in self._live.answers.tags.names(rows.tolist())]
+        return [self._topics.tag(tag) for tag in self._live.answers.tags.rows.names(rows.tolist())]
 
     def _name_of(self, tag: str) -> str:
         return self._live.answers.site.tag_settings(tag).name or tag
