@@ -77,7 +77,7 @@ class BlackBox:
         self._clock = clock
         self._changed: deque[int] = deque()  # indices of sites
         for site in sites:
-            site.store.on_change(partial(self._changed.append, site.index))
+            site.store.on_change.append(partial(self._changed.append, site.index))
         self._doubts_told = 0  # of `AnchorDoubts.changes`
         self._began_s: float | None = None  # the last piece; None: a new one is to begin
         self._tried_s = -math.inf

@@ -54,8 +54,8 @@ class DeliveryThread(Worker):
         self._edited = deque(range(len(sites)))
         self._with_news: deque[int] = deque()
         for index, site in enumerate(sites):
-            site.destinations.on_change(partial(self._note, self._edited, index))
-            site.store.on_commit(partial(self._note, self._with_news, index))
+            site.destinations.on_change.append(partial(self._note, self._edited, index))
+            site.store.on_commit.append(partial(self._note, self._with_news, index))
             site.deliveries.on_retry(partial(self._note, self._with_news, index))
         self._served: dict[Name, Destination] = {}
         self._queues: dict[Name, Queue] = {}

@@ -93,12 +93,8 @@ class EventStore:
         self.newest = int(database.rows(_NEWEST)[0][0]) if database.is_made else 0
         """The sequence of the newest event. Readers poll it."""
         self.dropped_deliveries = 0
-        self._told: list[Callable[[], None]] = []
+        self.on_commit: list[Callable[[], None]] = []  # called after each commit, on its thread
         self._telling = Lock()
-
-    def on_commit(self, told: Callable[[], None]) -> None:
-        """Call this after every commit of events, on the thread that makes it."""
-        self._told.append(told)
 
     def commit(self, happened: Sequence[Happening], states: States, stays: Sequence[Stay] = ()) -> int:
         """Store events, states and ended stays, and queue the events for their destinations. Return how many events."""
@@ -128,7 +124,7 @@ class EventStore:
         """Tell of events up to this one. Two threads may do so in any order."""
         with self._telling:
             is_news, self.newest = newest > self.newest, max(newest, self.newest)
-        for told in self._told if is_news else ():
+        for told in self.on_commit if is_news else ():
             told()
 
     def _add_all(self, connection: sqlite3.Connection, happened: Sequence[Happening], following: int) -> int:

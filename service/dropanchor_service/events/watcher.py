@@ -41,7 +41,7 @@ class Watcher:
         self._edited = deque(range(len(sites)))
         for index, site in enumerate(sites):
             for told in (site.items.zones, site.items.rules, site.store):
-                told.on_change(partial(self._edited.append, index))
+                told.on_change.append(partial(self._edited.append, index))
         self._with_pairs: dict[int, SiteWatch] = {}
         self._with_tag_rules: dict[int, SiteWatch] = {}
         self._pose_version = 0
@@ -58,11 +58,11 @@ class Watcher:
 
         Poses are none while there is no zone and no rule.
         """
-        self._latest.on_change(lambda: told() if self._follows_poses else None)
-        self._rows.start_news.on_change(told)
+        self._latest.on_change.append(lambda: told() if self._follows_poses else None)
+        self._rows.start_news.on_change.append(told)
         for site in self._watched:
             for one in (site.items.zones, site.items.rules, site.store):
-                one.on_change(told)
+                one.on_change.append(told)
 
     @property
     def needs_time(self) -> bool:

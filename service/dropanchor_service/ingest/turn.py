@@ -66,7 +66,7 @@ class Ingest:
         self._observers = observers
         self._announced: deque[str] = deque(maxlen=1024)
         for site in sites:
-            site.store.on_change(buffer.wake)
+            site.store.on_change.append(buffer.wake)
 
     def announce(self, key: str) -> None:
         """Admit the tag with this key, which is online, in the next turn. Thread-safe."""

@@ -49,7 +49,7 @@ class SiteFolders:
         self._following = Lock()
         for index, one in enumerate(self.all):
             if one.recorder is not None:
-                one.recorder.on_change(partial(self._follow, index, one.recorder))
+                one.recorder.on_change.append(partial(self._follow, index, one.recorder))
         if recorders := [one.recorder for one in self.all if one.recorder is not None]:
             metrics.register(RecordingMetrics(*recorders))
 

@@ -11,5 +11,5 @@ def follow_floors(plans: PlanStore, site: SiteStore) -> None:
     def follow() -> None:
         site.floors = floors_of(plan.floor for plan in plans.all.values())
 
-    plans.on_change(follow)
+    plans.on_change.append(follow)
     follow()

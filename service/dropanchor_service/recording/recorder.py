@@ -62,7 +62,7 @@ class Recorder:
         self._now_ns = now_ns
         self._metadata = metadata
         self._running: RunningRecording | None = None
-        self._told: list[Callable[[], None]] = []
+        self.on_change: list[Callable[[], None]] = []  # called after a begin or an end, on its thread
         self._ending = threading.Lock()  # nothing is queued behind the end, where it would open another file
         self._site_version = 0
         self._session = ""
@@ -84,12 +84,8 @@ class Recorder:
         if self._owned is not None:
             self._owned.close()
 
-    def on_change(self, told: Callable[[], None]) -> None:
-        """Call this after a recording has begun or ended, on the thread that made it."""
-        self._told.append(told)
-
     def _tell(self) -> None:
-        for told in self._told:
+        for told in self.on_change:
             told()
 
     @property

@@ -48,7 +48,7 @@ class NamedItems(Generic[Item]):
         self._items: dict[str, Item] = {}
         if path is not None:
             self._items = (recovery or Recovery()).read(path, adapter.validate_json, mode) or {}
-        self._told: list[Callable[[], None]] = []
+        self.on_change: list[Callable[[], None]] = []  # called after every change, on the thread that makes it
         self._noted: Callable[[str, Item | None, Item | None], Change] = partial(Change, "item")
         self.trail: Trail = NO_TRAIL
         self.version = 1
@@ -57,10 +57,6 @@ class NamedItems(Generic[Item]):
         """Note each change in a trail. shown: returns what of an item may be read there."""
         self.trail = trail
         self._noted = partial(Change, kind, shown=shown)
-
-    def on_change(self, told: Callable[[], None]) -> None:
-        """Call this after every change, on the thread that makes it."""
-        self._told.append(told)
 
     def share(self, saved: bytes | None, save: Save) -> None:
         """Go on from what another process has saved; see `Shared`."""
@@ -112,7 +108,7 @@ class NamedItems(Generic[Item]):
     def _apply(self, items: dict[str, Item]) -> None:
         self._items = items
         self.version += 1
-        for told in self._told:
+        for told in self.on_change:
             told()
 
 

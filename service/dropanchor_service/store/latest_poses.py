@@ -30,11 +30,7 @@ class LatestPoses:
         self._history = PoseHistory()
         self._innovations = RowRings(INNOVATION, MAX_INNOVATIONS, MAX_INNOVATION_BYTES, wide=("measured",))
         self._version = 0
-        self._told: list[Callable[[], None]] = []
-
-    def on_change(self, told: Callable[[], None]) -> None:
-        """Call this after every change, on the thread that makes it."""
-        self._told.append(told)
+        self.on_change: list[Callable[[], None]] = []  # called after every change, on the thread that makes it
 
     @property
     def version(self) -> int:
@@ -42,7 +38,7 @@ class LatestPoses:
         return self._version
 
     def _tell(self) -> None:
-        for told in self._told:
+        for told in self.on_change:
             told()
 
     def write(self, poses: Array, hypotheses: Array, innovations: Array | None = None) -> None:

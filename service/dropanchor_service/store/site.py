@@ -62,7 +62,7 @@ class SiteStore:
         self._document = self._values.in_force(self.configured)
         self._indices = AnchorIndices(self.site.anchors)
         self._groups = groups_of(self._document.tags, self.default_settings)
-        self._told: list[Callable[[], None]] = []
+        self.on_change: list[Callable[[], None]] = []  # called after every change, on the thread that makes it
         self.version = 1
 
     def _open_file(self, path: Path, recovery: Recovery) -> None:
@@ -110,10 +110,6 @@ class SiteStore:
                 self._migrate()
         elif self._has_file:
             self._save(self._values)
-
-    def on_change(self, told: Callable[[], None]) -> None:
-        """Call this after every change, on the thread that makes it."""
-        self._told.append(told)
 
     @property
     def site(self) -> Site:
@@ -296,5 +292,5 @@ class SiteStore:
         self._groups = groups_of(document.tags, self.default_settings)
         self._indices.add(self.site.anchors)
         self.version += 1
-        for told in self._told:
+        for told in self.on_change:
             told()

@@ -66,7 +66,7 @@ class Sites:
         site = ServedSite(index, store, tags, pending, HealthTable(), quota)
         self._sites.append(site)
         self._changed.append(index)
-        store.on_change(partial(self._changed.append, index))
+        store.on_change.append(partial(self._changed.append, index))
         return site
 
     def add_former(self, name: str) -> ServedSite:

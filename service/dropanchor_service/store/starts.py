@@ -36,15 +36,11 @@ class StartNewsQueue:
 
     def __init__(self) -> None:
         self._waiting: deque[StartNews] = deque()
-        self._told: list[Callable[[], None]] = []
-
-    def on_change(self, told: Callable[[], None]) -> None:
-        """Call this after every addition, on the thread that makes it."""
-        self._told.append(told)
+        self.on_change: list[Callable[[], None]] = []  # called after every addition, on the thread that makes it
 
     def append(self, news: StartNews) -> None:
         self._waiting.append(news)
-        for told in self._told:
+        for told in self.on_change:
             told()
 
     def take(self) -> list[StartNews]:

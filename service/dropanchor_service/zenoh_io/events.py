@@ -25,7 +25,7 @@ class ZenohEvents(PeriodicPublisher):
         self._session = session
         self._stores = stores
         for store in stores:
-            store.on_commit(self.wake)
+            store.on_commit.append(self.wake)
         self._published = [store.newest for store in stores]
 
     def publish(self) -> None:

@@ -37,7 +37,7 @@ class ZenohPoses(PeriodicPublisher):
         self._frame_version = 0
         self._frame_due_s = 0.0
         self._is_matched = False
-        sites.latest.on_change(self._on_change)
+        sites.latest.on_change.append(self._on_change)
 
     def __enter__(self) -> Self:
         tags, frames = self._keys()

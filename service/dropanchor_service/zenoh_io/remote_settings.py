@@ -23,7 +23,7 @@ class ZenohRemoteSettings(PeriodicPublisher):
         self._session = session
         self._stores = [site.store for site in sites]
         for store in self._stores:
-            store.on_change(self.wake)
+            store.on_change.append(self.wake)
         self._published = [store.document.remote for store in self._stores]
 
     def publish(self) -> None:
