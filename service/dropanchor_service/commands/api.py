@@ -1,10 +1,9 @@
 """`dropanchor api`: run an API node of a cluster until it is stopped."""
 
 import argparse
-from pathlib import Path
 
 from dropanchor_service.api.http.server import ListenError
-from dropanchor_service.commands.options import add_log_option, add_security_options, given
+from dropanchor_service.commands.options import add_http_options, add_log_option, add_security_options, given
 from dropanchor_service.node.node import Node
 from dropanchor_service.runtime import logs, open_files
 from dropanchor_service.runtime.signals import interrupts
@@ -26,9 +25,7 @@ EXIT_DIED = 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML); options override it")
-    parser.add_argument("--host", help="address of the page and the REST interface (default: 127.0.0.1)")
-    parser.add_argument("--port", type=int, help="port of the page and the REST interface (default: 8080); 0: any free")
+    add_http_options(parser)
     parser.add_argument("--url", metavar="URL", help="PostgreSQL database of the cluster (cluster.url)")
     parser.add_argument(
         "--node-secret", metavar="FILE", help="secret that the services have, too (cluster.node_secret)"

@@ -19,13 +19,11 @@ from dropanchor_tag_client.sources.phones.pairing import Signs
 
 DESCRIPTION = """\
 Turns what you have into a recording: a folder with range.csv, imu.csv, heading.csv, pressure.csv and anchors.csv,
-which
-`dropanchor replay` and `dropanchor-tag replay` read. It says what it decided, converts and leaves out.
+which `dropanchor replay` and `dropanchor-tag replay` read. It says what it decided, converts and leaves out.
 
 A SOURCE is one of
   a bag of ROS             ROS 1 (.bag), ROS 2 (folder, .mcap, .db3): sensor_msgs/Imu, MagneticField, Range,
-                           FluidPressure, and others
-                           with --map
+                           FluidPressure, and others with --map
   an MCAP file             with messages in JSON, or a recording of this service
   an export of a phone     Sensor Logger or phyphox: the folder, or the zip
   tables                   CSV, TSV, JSON, JSON Lines or Parquet: a file, a folder or a zip

@@ -10,9 +10,7 @@ from dropanchor_tag_client.command_line import LOG_LEVELS
 
 
 def add_service_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML); options override it")
-    parser.add_argument("--host", help="address of the page and the REST interface (default: 127.0.0.1)")
-    parser.add_argument("--port", type=int, help="port of the page and the REST interface (default: 8080); 0: any free")
+    add_http_options(parser)
     zenoh = parser.add_mutually_exclusive_group()
     zenoh.add_argument(
         "--zenoh-listen", metavar="ENDPOINT", help="endpoint of the built-in Zenoh router (default: tcp/127.0.0.1:7447)"
@@ -24,6 +22,12 @@ def add_service_options(parser: argparse.ArgumentParser) -> None:
     )
     add_security_options(parser)
     add_log_option(parser)
+
+
+def add_http_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML); options override it")
+    parser.add_argument("--host", help="address of the page and the REST interface (default: 127.0.0.1)")
+    parser.add_argument("--port", type=int, help="port of the page and the REST interface (default: 8080); 0: any free")
 
 
 def add_security_options(parser: argparse.ArgumentParser) -> None:

@@ -69,8 +69,6 @@ _OF_TRUTHS = _TRUTHS | {"ground", "position", "pos", "pose", "p", "t", "translat
 _BARE = {"vector", "value", "values", "data", "xyz"}
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+|°/?s?")
-
-
 _ROSTOPIC = "field."  # rostopic echo -p puts it before each name
 _OF_APPLE = "accelerometerAcceleration"  # of SensorLog: as iPhones give it, -1 upwards at rest
 _TEMPERATURE = re.compile(r"°|(?:°|deg)? ?[CFK]", re.IGNORECASE)
@@ -175,11 +173,9 @@ def _by_unit(words: list[str], unit: str) -> _Found | None:
     quantity = next(of_sensor, None) if known(unit, MAG) or known(unit, ACC) or known(unit, GYRO) else None
     words = words[:1] if words[1:] == ["axis"] else words  # of MetaWear: x-axis (g)
     axis = words[-1][-1] if words and not _NOT_A_READING & set(words) else ""
-    return (
-        None
-        if quantity is None or axis not in "xyz" or not axis
-        else _Found(VECTORS[quantity]["xyz".index(axis)], None, 5)
-    )
+    if quantity is None or axis not in "xyz" or not axis:
+        return None
+    return _Found(VECTORS[quantity]["xyz".index(axis)], None, 5)
 
 
 def _of_table(table: str, name: str) -> _Found | None:
