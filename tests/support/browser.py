@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import pytest
-from playwright.sync_api import Browser, Error, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Error, Locator, Page, expect, sync_playwright
 
 from support.patience import PATIENCE_S
 
@@ -153,6 +153,18 @@ class WatchedPage:
             });
         }"""
         return [tuple(colour) for colour in self.page.evaluate(script, [list(place) for place in places])]
+
+
+def drag(page: Page, handle: Locator, dx: int, dy: int) -> None:
+    """Drag an element with the mouse by so many pixels."""
+    box = handle.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + dx / 2, y + dy / 2)
+    page.mouse.move(x + dx, y + dy)
+    page.mouse.up()
 
 
 @contextmanager

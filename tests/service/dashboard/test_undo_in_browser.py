@@ -4,14 +4,14 @@ import re
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, Route, expect
+from playwright.sync_api import Browser, Locator, Route, expect
 
 from dropanchor_schemas.destinations import WebhookDestination
 from dropanchor_schemas.site import Anchor, TagSettings
 from dropanchor_schemas.zones import Polygon
 from service.dashboard.alert_place import SECRET, alert_place, put_mail
 from service.dashboard.zone_place import ZonePlace, disc, served, square
-from support.browser import WatchedPage, watched_page
+from support.browser import WatchedPage, drag, watched_page
 from support.zenoh_router import wait_until
 
 pytestmark = pytest.mark.browser
@@ -35,17 +35,6 @@ def outcome_of(page: WatchedPage) -> Locator:
 def said(outcome: Locator, sentence: str) -> None:
     """Wait until the message begins with a sentence."""
     expect(outcome).to_have_text(re.compile(f"^{re.escape(sentence)}"))
-
-
-def drag(page: Page, handle: Locator, dx: int, dy: int) -> None:
-    box = handle.bounding_box()
-    assert box is not None
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x + dx / 2, y + dy / 2)
-    page.mouse.move(x + dx, y + dy)
-    page.mouse.up()
 
 
 def corner_of(place: ZonePlace, zone: str) -> list[float]:

@@ -10,7 +10,7 @@ from dropanchor_schemas.zones import Circle, Polygon
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
 from service.dashboard.zone_place import ZonePlace, disc, served, square, zone_place
-from support.browser import WatchedPage, open_page, watched_page
+from support.browser import WatchedPage, drag, open_page, watched_page
 
 pytestmark = pytest.mark.browser
 
@@ -35,17 +35,6 @@ def points_of(place: ZonePlace, zone: str) -> list[list[float]]:
     shape = place.zones[zone].shape
     assert isinstance(shape, Polygon)
     return shape.points
-
-
-def drag(page: WatchedPage, handle: Locator, dx: int, dy: int) -> None:
-    box = handle.bounding_box()
-    assert box is not None
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.page.mouse.move(x, y)
-    page.page.mouse.down()
-    page.page.mouse.move(x + dx / 2, y + dy / 2)
-    page.page.mouse.move(x + dx, y + dy)
-    page.page.mouse.up()
 
 
 def test_zones_are_drawn_and_edited_with_pointer_and_keyboard(chromium: Browser, yard: ZonePlace) -> None:
@@ -79,8 +68,8 @@ def test_zones_are_drawn_and_edited_with_pointer_and_keyboard(chromium: Browser,
 
         page.page.get_by_role("button", name="Edit Yard").click()
         expect(form.get_by_label("Name")).to_be_focused()
-        drag(page, page.page.get_by_role("button", name="Corner 1 of 4"), -40, 20)
-        drag(page, page.page.get_by_role("button", name="New corner after 4"), -30, 0)
+        drag(page.page, page.page.get_by_role("button", name="Corner 1 of 4"), -40, 20)
+        drag(page.page, page.page.get_by_role("button", name="New corner after 4"), -30, 0)
         page.page.get_by_role("button", name="Corner 3 of 5").press("Delete")
         form.get_by_role("button", name="Save zone").click()
         expect(form).to_be_hidden()
@@ -108,7 +97,7 @@ def test_zones_are_drawn_and_edited_with_pointer_and_keyboard(chromium: Browser,
 
         page.page.get_by_role("button", name="New circle").click()
         page.page.locator("#map").click(position={"x": 300, "y": 500})
-        drag(page, page.page.get_by_role("button", name="Radius"), 30, 0)
+        drag(page.page, page.page.get_by_role("button", name="Radius"), 30, 0)
         form.get_by_label("Name").fill("Pit")
         form.get_by_role("button", name="Save zone").click()
         expect(form).to_be_hidden()

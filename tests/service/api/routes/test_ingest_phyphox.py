@@ -11,9 +11,8 @@ import pytest
 from dropanchor_schemas.answers import PhoneReadingsReceived
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
 from dropanchor_service.phones.phyphox import parse
-from dropanchor_service.security.api_keys import SOURCE, ApiKeys
-from dropanchor_service.security.identity import Authenticator, Scope
-from support.api import ApiBench, ask, kind_of, make_api_bench
+from service.api.routes.test_ingest import Guarded
+from support.api import ask, kind_of, make_api_bench
 from support.phyphox import event, message, recording
 from support.sensor_logger import G
 
@@ -21,14 +20,8 @@ PHYPHOX = "/api/v1/ingest/phyphox"
 [BATCH] = recording(0.2, {"gyroscope": lambda _: (0, 0, 0), "accelerometer": lambda _: (0, 0, G)}, 1_800_000_000.0)
 
 
-class Guarded:
-    """An interface with a key of the tag anna and one that may change things."""
-
-    def __init__(self, folder: Path) -> None:
-        keys = ApiKeys(folder)
-        self.anna, self.writer = keys.add_for_tag("anna's phone", "anna"), keys.add("writer", Scope.WRITE)
-        self.bench: ApiBench = make_api_bench()
-        self.app = self.bench.app(authenticator=Authenticator({SOURCE: keys}))
+class Asking(Guarded):
+    """The same with requests of any kind."""
 
     def ask(self, method: str, path: str, secret: str = "", content: bytes = b"") -> httpx.Response:
         headers = {"authorization": f"Bearer {secret}"} if secret else {}
@@ -36,8 +29,8 @@ class Guarded:
 
 
 @pytest.fixture
-def guarded(tmp_path: Path) -> Guarded:
-    return Guarded(tmp_path)
+def guarded(tmp_path: Path) -> Asking:
+    return Asking(tmp_path)
 
 
 def connection_of(content: bytes) -> ElementTree.Element:
@@ -46,7 +39,7 @@ def connection_of(content: bytes) -> ElementTree.Element:
     return connection
 
 
-def test_what_the_experiment_sends_where_it_says_becomes_samples(guarded: Guarded) -> None:
+def test_what_the_experiment_sends_where_it_says_becomes_samples(guarded: Asking) -> None:
     response = guarded.ask("GET", f"{PHYPHOX}?token={guarded.anna}")
     assert (response.status_code, response.headers["cache-control"]) == (200, "no-store")
     address = urlsplit(connection_of(response.content).attrib["address"])
@@ -88,7 +81,7 @@ def test_a_tag_whose_name_needs_escapes_gets_an_experiment_that_can_be_read() ->
     assert ElementTree.fromstring(content).findtext("title") == 'Tag <b> & "'
 
 
-def test_the_code_is_an_image_for_the_key_that_asks(guarded: Guarded) -> None:
+def test_the_code_is_an_image_for_the_key_that_asks(guarded: Asking) -> None:
     response = guarded.ask("GET", f"{PHYPHOX}/code?tag=anna", guarded.anna)
     assert response.headers["content-type"].startswith("image/svg+xml")
     assert ElementTree.fromstring(response.content).tag.endswith("svg")
@@ -96,7 +89,7 @@ def test_the_code_is_an_image_for_the_key_that_asks(guarded: Guarded) -> None:
 
 
 @pytest.mark.parametrize(("method", "path"), [("GET", PHYPHOX), ("GET", f"{PHYPHOX}/code"), ("POST", PHYPHOX)])
-def test_a_key_is_needed_and_speaks_for_its_own_tag_only(guarded: Guarded, method: str, path: str) -> None:
+def test_a_key_is_needed_and_speaks_for_its_own_tag_only(guarded: Asking, method: str, path: str) -> None:
     assert kind_of(guarded.ask(method, path)) == "unauthenticated"
     assert kind_of(guarded.ask(method, f"{path}?tag=bert", guarded.anna)) == "forbidden"
     assert kind_of(guarded.ask(method, path, guarded.writer)) == "forbidden"
