@@ -11,8 +11,8 @@ import pytest
 
 from benchmarks import report
 from benchmarks.motion import ANCHOR, MESSAGE_S, STEP_NS, TRACKS, Track, message, tracks
-from dropanchor_schemas import Anchor, Site, TagSettings
 from dropanchor_schemas.keys import samples_key
+from dropanchor_schemas.site import Anchor, Site, TagSettings
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.settings.quota import Quota
 from dropanchor_service.store import Sites, SiteStore

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from dropanchor_schemas import Pose, keys
+from dropanchor_schemas import keys
 from dropanchor_schemas.explain import Explanation
-from dropanchor_schemas.pose import PoseFrame
+from dropanchor_schemas.pose import Pose, PoseFrame
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, encode_json, encode_packed
 from dropanchor_service.answers.times import iso_utc
 from dropanchor_service.engines.choose import create_engine

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_schemas import Anchor, Site, TagSettings
+from dropanchor_schemas.site import Anchor, Site, TagSettings
 from dropanchor_schemas.wire import Frame, RangeSample, encode_packed
 from dropanchor_service.estimation.columns import POSE, Array
 from dropanchor_service.estimation.fleet.engine import FleetEngine

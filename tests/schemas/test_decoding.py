@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dropanchor_schemas import decode_json
 from dropanchor_schemas.kinds import KINDS
+from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.wire import (
     COUNTS_AT,
     HEADER,

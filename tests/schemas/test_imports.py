@@ -16,7 +16,3 @@ def test_the_publishing_path_imports_neither_pydantic_nor_numpy(module: str) -> 
     loaded = loaded_by(f"import dropanchor_schemas.{module}")
     assert "dropanchor_schemas" in loaded
     assert not loaded & {"pydantic", "pydantic_core", "numpy", "zenoh"}
-
-
-def test_the_models_are_imported_on_first_use() -> None:
-    assert "pydantic" in loaded_by("from dropanchor_schemas import Pose")

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
-from dropanchor_schemas import SamplesMessage, decode_json, export
+from dropanchor_schemas import export
 from dropanchor_schemas.kinds import KINDS
+from dropanchor_schemas.samples import SamplesMessage, decode_json
 from dropanchor_schemas.wire import Frame, encode_json
 from support.payloads import frames
 

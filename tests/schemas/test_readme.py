@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_schemas import decode_json, keys
+from dropanchor_schemas import keys
 from dropanchor_schemas.pose import Pose, PoseFrame
+from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.wire import (
     BearingSample,
     Frame,

@@ -2,7 +2,7 @@
 
 import math
 
-from dropanchor_schemas import decode_json
+from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.wire import (
     Frame,
     HeadingSample,

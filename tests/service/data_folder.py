@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from dropanchor_schemas import Anchor
 from dropanchor_schemas.destinations import WebhookDestination
 from dropanchor_schemas.plans import Plan
 from dropanchor_schemas.shares import ShareRequest
-from dropanchor_schemas.site import TagSettings
+from dropanchor_schemas.site import Anchor, TagSettings
 from dropanchor_schemas.zones import BatteryLowRule
 from dropanchor_service.api.routes.plan_examples import PLAN
 from dropanchor_service.checkpoints.files import CheckpointFolder

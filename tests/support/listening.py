@@ -6,7 +6,8 @@ from contextlib import contextmanager
 import zenoh
 import zenoh.ext
 
-from dropanchor_schemas import decode_json, keys
+from dropanchor_schemas import keys
+from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.wire import ENCODING_PACKED, Frame, decode_packed, payload_encoding
 from support.zenoh_router import connected_session, make_known
 

@@ -7,8 +7,7 @@ import numpy as np
 from fastapi import FastAPI
 from prometheus_client import CollectorRegistry
 
-from dropanchor_schemas import Anchor
-from dropanchor_schemas.site import Site
+from dropanchor_schemas.site import Anchor, Site
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.app import create_app_of
 from dropanchor_service.api.routes.shared_parts import SharedParts

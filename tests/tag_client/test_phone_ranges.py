@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_schemas import decode_json
+from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.wire import Frame
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator

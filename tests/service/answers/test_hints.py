@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from dropanchor_schemas import Anchor, Pose, TagSettings
+from dropanchor_schemas.pose import Pose
 from dropanchor_schemas.pose import StateReason as ReasonName
+from dropanchor_schemas.site import Anchor, TagSettings
 from dropanchor_schemas.wire import Frame, HeadingSample, ImuSample, RangeSample
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.answers.columns import REASONS

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_schemas import Anchor, Site
+from dropanchor_schemas.site import Anchor, Site
 from dropanchor_schemas.wire import Frame, RangeSample
 from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.settings.quota import Quota

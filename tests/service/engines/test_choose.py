@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from dropanchor_schemas import Anchor, StartPose, TagSettings
+from dropanchor_schemas.site import Anchor, StartPose, TagSettings
 from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.estimation.columns import HeadingSource, Motion
 from dropanchor_service.settings.engine_columns import anchor_columns, tag_columns

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_schemas import TagSettings
 from dropanchor_schemas.keys import samples_key
+from dropanchor_schemas.site import TagSettings
 from dropanchor_service.ingest.buffer import UNREGISTERED_PER_TURN
 from service.ingest.messages import S, T, ranges
 from support.ingest import IngestBench

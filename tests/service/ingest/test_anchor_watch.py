@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from dropanchor_schemas import Anchor
+from dropanchor_schemas.site import Anchor
 from dropanchor_schemas.wire import Frame
 from dropanchor_service.answers.hints import hints_of
 from dropanchor_service.estimation.columns import INNOVATION, POSE, Array, PoseBatch, State, StateReason

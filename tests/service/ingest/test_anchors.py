@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from dropanchor_schemas import Anchor
+from dropanchor_schemas.site import Anchor
 from dropanchor_schemas.wire import ENCODING_JSON, anchor_number, encode_json
 from dropanchor_service.store.unknown_anchors import FRESH_NS, MAX_LOGGED
 from service.ingest.messages import ranges

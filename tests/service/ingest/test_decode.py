@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dropanchor_schemas import decode_json
+from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.wire import (
     ENCODING_JSON,
     ENCODING_PACKED,

@@ -1,6 +1,6 @@
 """What the engine does not use is counted for its tag, as what the ingest rejects is."""
 
-from dropanchor_schemas import Anchor, Site, StartPose, TagSettings
+from dropanchor_schemas.site import Anchor, Site, StartPose, TagSettings
 from dropanchor_schemas.wire import Frame, HeadingSample, ImuSample, RangeSample
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.store import Tag

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dropanchor_schemas import Anchor, Site, TagSettings
+from dropanchor_schemas.site import Anchor, Site, TagSettings
 from dropanchor_schemas.wire import Frame, RangeSample
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.settings.quota import Quota

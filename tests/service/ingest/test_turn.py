@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from dropanchor_schemas import StartPose, TagSettings
+from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_schemas.wire import (
     ENCODING_JSON,
     Frame,

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from dropanchor_schemas import Anchor
+from dropanchor_schemas.site import Anchor
 from dropanchor_service.events.drafts import destination_test
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.persistence.site import open_sites

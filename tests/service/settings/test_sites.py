@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_schemas import Anchor
+from dropanchor_schemas.site import Anchor
 from dropanchor_service.persistence.site import open_sites
 from dropanchor_service.settings.many_sites import MOST_WITH_FILES, refuse_too_many_sites
 from dropanchor_service.settings.quota import Quota

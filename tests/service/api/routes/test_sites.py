@@ -8,8 +8,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from dropanchor_schemas import Anchor
 from dropanchor_schemas.answers import SiteList
+from dropanchor_schemas.site import Anchor
 from dropanchor_service.api.http.permissions import Need, need_of
 from support.api import ask, kind_of, make_api_bench
 from support.delivery import SECRET

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dropanchor_schemas import StartPose, TagSettings
+from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.belief.births.guesses import may_have_own_error
 from dropanchor_service.estimation.fleet.belief.heading_models import (
