@@ -128,7 +128,7 @@ class BlackBox:
         """Wait until what has arrived is written."""
         sync = _Sync()
         self.writer.put(sync, 0)
-        self.writer.hurry()
+        self.writer.wake()
         sync.is_done.wait(wait_s)
 
     def between_turns(self, has_pending: bool) -> None:

@@ -150,7 +150,7 @@ class Recorder:
             self.writer.put(end, 0)
         self._tell()
         if wait_s > 0:
-            self.writer.hurry()
+            self.writer.wake()
             end.is_done.wait(wait_s)
         return True
 

@@ -9,16 +9,18 @@ from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
 from dropanchor_service.runtime.logs import RareLog
+from dropanchor_service.runtime.worker import Worker
 
 RETRY_S = 1.0
+STOP_S = 2.0
 STUCK_S = 10.0
 
 Item = TypeVar("Item")
 Write = Callable[[Sequence[Item]], None]
 
 
-class BackgroundWriter(Generic[Item]):
-    """A bounded queue that passes its items to `write` every `period_s`, even when it is empty.
+class BackgroundWriter(Worker, Generic[Item]):
+    """A bounded queue that passes its items to `write` every `period_s`, even when it is empty, and on `wake`.
 
     When `write` raises OSError or sqlite3.Error, the same items are tried again every second until it succeeds.
     Meanwhile the queue fills; items that do not fit are dropped and counted. Any other error is a bug, and its items
@@ -29,6 +31,7 @@ class BackgroundWriter(Generic[Item]):
         self, name: str, write: Write[Item], period_s: float, max_bytes: int, waits_for: str = "the disk"
     ) -> None:
         """waits_for: what `write` waits for, for sentences."""
+        super().__init__(name, STOP_S)
         self._log = RareLog(logging.getLogger(f"{__name__}.{name}"))
         self._name, self._waits_for = name, waits_for
         self._write = write
@@ -36,23 +39,11 @@ class BackgroundWriter(Generic[Item]):
         self._max_bytes = max_bytes
         self._lock = threading.Lock()
         self._queue: deque[tuple[Item, int, int]] = deque()  # item, size, count
-        self._bytes = 0
-        self._stop = threading.Event()
-        self._flush_now = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self.queued_bytes = 0
         self.dropped = 0
         self.errors = 0
         self._problem: str | None = None
         self._began_s: float | None = None  # while `write` runs
-
-    def start(self) -> None:
-        self._thread.start()
-
-    def stop(self, timeout_s: float = 2.0) -> None:
-        """Write the queued items once more and end the thread."""
-        self._stop.set()
-        self._flush_now.set()
-        self._thread.join(timeout_s)
 
     @property
     def problem(self) -> str | None:
@@ -62,36 +53,24 @@ class BackgroundWriter(Generic[Item]):
             return f"{self._name} cannot be written: {self._waits_for} has not answered for more than {STUCK_S:.0f} s"
         return self._problem
 
-    @property
-    def is_alive(self) -> bool:
-        return self._thread.is_alive()
-
-    @property
-    def queued_bytes(self) -> int:
-        return self._bytes
-
     def put(self, item: Item, size: int, count: int = 1) -> None:
         """Queue an item; any thread may call this.
 
         size: in bytes. count: by how much `dropped` grows when the item does not fit.
         """
         with self._lock:
-            if self._bytes + size > self._max_bytes:
+            if self.queued_bytes + size > self._max_bytes:
                 self.dropped += count
                 return
             self._queue.append((item, size, count))
-            self._bytes += size
-        if self._bytes > self._max_bytes // 2:
-            self._flush_now.set()
-
-    def hurry(self) -> None:
-        """Write what is queued now, and not at the end of the period."""
-        self._flush_now.set()
+            self.queued_bytes += size
+        if self.queued_bytes > self._max_bytes // 2:
+            self.wake()
 
     def _run(self) -> None:
         while not self._stop.is_set():
-            self._flush_now.wait(self._period_s)
-            self._flush_now.clear()
+            self._news.wait(self._period_s)
+            self._news.clear()
             if not self.flush():
                 self._stop.wait(RETRY_S)
         self.flush()
@@ -120,7 +99,7 @@ class BackgroundWriter(Generic[Item]):
             self._began_s = None
         with self._lock:
             for _ in range(count):
-                self._bytes -= self._queue.popleft()[1]
+                self.queued_bytes -= self._queue.popleft()[1]
         return True
 
     def _record_error(self, error: Exception) -> None:

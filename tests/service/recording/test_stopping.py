@@ -86,6 +86,6 @@ def test_nothing_is_recorded_behind_the_end(bench: ApiBench) -> None:
             recorder.stop(10.0)
             stopped.set()
             ingest.join()
-            recorder.writer.hurry()
+            recorder.writer.wake()
             assert recorder.open_name is None
     assert all(file.finished for file in recorder.files())
