@@ -184,7 +184,8 @@ class TagSettings(Exact):
         default=None,
         title="Slip",
         description="Standard deviation of the direction of travel about body x plus the mounting angle, caused by "
-        "the slip of a vehicle or the sway of a carrier; 0: none; null: the engine's default.",
+        "the slip of a vehicle or the sway of a carrier; 0: none; 3: it moves in any direction, as a drone does; null: "
+        "the engine's default.",
     )
     speed_max_mps: Positive | None = Field(
         default=None, title="Top speed", description="Top speed of the tag; null: unknown, the engine's default."

@@ -30,7 +30,7 @@ export default {
   "model.lever_left_m": "Hebelarm nach links",
   "model.lever_left_m.what": "Wie weit das Tag links von diesem Punkt sitzt, entlang der y-Achse des Tags.",
   "model.slip_std_rad": "Schlupf",
-  "model.slip_std_rad.what": "Standardabweichung der Fahrtrichtung um x-Achse plus Einbauwinkel, durch den Schlupf eines Fahrzeugs oder das Schwanken einer Person; 0: keine; nicht gesetzt: die Vorgabe des Schätzers.",
+  "model.slip_std_rad.what": "Standardabweichung der Fahrtrichtung um x-Achse plus Einbauwinkel, durch den Schlupf eines Fahrzeugs oder das Schwanken einer Person; 0: keine; 3: beliebige Richtung, wie bei einer Drohne; nicht gesetzt: die Vorgabe des Schätzers.",
   "model.speed_max_mps": "Höchstgeschwindigkeit",
   "model.speed_max_mps.what": "So schnell kann das Tag höchstens sein; nicht gesetzt: unbekannt, die Vorgabe des Schätzers.",
   "model.reverse_allowed": "Fährt rückwärts",
