@@ -7,7 +7,7 @@ from threading import Event
 from fastapi import FastAPI
 
 from dropanchor_service.answers.of_sites import AnswersOfSites
-from dropanchor_service.api.app import create_app_of
+from dropanchor_service.api.app import create_app
 from dropanchor_service.api.http.borders import border_of
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.health import Ready
@@ -74,7 +74,7 @@ class Serving:
         url: str,
         box: BlackBox | None,
     ) -> FastAPI:
-        """Return the application; see `create_app_of`. url: where the service listens."""
+        """Return the application; see `create_app`. url: where the service listens."""
         parts = [
             SiteParts(
                 of_site,
@@ -92,7 +92,7 @@ class Serving:
                 self._sites, answers, self.folders.all, self.zone_events.parts, strict=True
             )
         ]
-        return create_app_of(
+        return create_app(
             parts, self._shared(stopping, url), ready=ready, impaired=impaired, registry=self._metrics.registry
         )
 

@@ -15,8 +15,11 @@ from prometheus_client import CollectorRegistry
 from dropanchor_schemas.answers import Problem
 from dropanchor_schemas.site import Anchor, Site
 from dropanchor_service.answers.answers import Answers
-from dropanchor_service.api import create_app
+from dropanchor_service.api.app import create_app
+from dropanchor_service.api.http.borders import Border
 from dropanchor_service.api.http.rates import RateLimiter
+from dropanchor_service.api.routes.shared_parts import SharedParts
+from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
@@ -42,6 +45,7 @@ class ApiBench:
     registry: CollectorRegistry = field(default_factory=CollectorRegistry)
     stopping: Event = field(default_factory=Event)
     not_ready: Sequence[str] = ()
+    impaired: Sequence[str] = ()
     now_ns: int = T_NS
     recorder: Recorder | None = None
     received: list[tuple[str, bytes, str]] = field(default_factory=list)
@@ -77,24 +81,25 @@ class ApiBench:
         plans: PlanStore | None = None,
         basemap: ServedBasemap | None = None,
     ) -> FastAPI:
-        return create_app(
+        parts = SiteParts(
             self.answers,
-            ready=lambda: (not self.not_ready, self.not_ready),
-            registry=self.registry,
-            stopping=self.stopping,
             receive=lambda *message: self.received.append(message),
             receive_health=lambda *message: self.received_health.append(message),
+            plans=plans or PlanStore(None),
+            events=events or EventParts.in_memory(self.answers.site.site.id, lambda: self.answers.now_ns()),
             recorder=self.recorder,
             max_tags=max_tags,
-            dashboard=dashboard,
-            authenticator=authenticator,
-            rate_limiter=rate_limiter,
-            endpoints=endpoints,
-            cors_origins=cors_origins,
-            events=events,
             omlox=omlox,
-            plans=plans,
-            basemap=basemap,
+        )
+        parts.events.note_changes(self.answers.site, parts.plans, omlox)
+        border = Border(origins=cors_origins)
+        return create_app(
+            [parts],
+            SharedParts(self.stopping, endpoints, None, authenticator, rate_limiter, border, basemap),
+            ready=lambda: (not self.not_ready, self.not_ready),
+            impaired=lambda: self.impaired,
+            registry=self.registry,
+            dashboard=dashboard,
         )
 
 

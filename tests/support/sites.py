@@ -9,7 +9,7 @@ from prometheus_client import CollectorRegistry
 
 from dropanchor_schemas.site import Anchor, Site
 from dropanchor_service.answers.answers import Answers
-from dropanchor_service.api.app import create_app_of
+from dropanchor_service.api.app import create_app
 from dropanchor_service.api.routes.shared_parts import SharedParts
 from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.delivery.event_parts import EventParts
@@ -64,7 +64,7 @@ def app_of_sites(
         )
         for site in sites
     ]
-    return create_app_of(
+    return create_app(
         parts,
         SharedParts(stopping or Event(), authenticator=authenticator),
         ready=lambda: (True, []),

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from threading import Event
-from typing import TYPE_CHECKING
 
 from fastapi import FastAPI, Request
 from prometheus_client import CollectorRegistry
@@ -12,14 +10,12 @@ from starlette.responses import RedirectResponse
 from starlette.routing import BaseRoute, Match, Route
 from starlette.types import Scope
 
-from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.document import openapi_of
 from dropanchor_service.api.http.access import Access
-from dropanchor_service.api.http.borders import Border, Borders
+from dropanchor_service.api.http.borders import Borders
 from dropanchor_service.api.http.errors import Kind, ProblemError, add_error_handlers
 from dropanchor_service.api.http.headers import SecurityHeaders, allow_origins
 from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
-from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.omlox.router import omlox_routes
 from dropanchor_service.api.routes.below import below
 from dropanchor_service.api.routes.dashboard import page_mounts
@@ -30,16 +26,6 @@ from dropanchor_service.api.routes.site_of_request import SitesOfApp
 from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.api.routes.sites import routes_of_sites
 from dropanchor_service.api.site_routers import INGEST, SITE
-from dropanchor_service.delivery.event_parts import EventParts
-from dropanchor_service.phones.intake import Receive
-from dropanchor_service.plans.store import PlanStore
-from dropanchor_service.recording.recorder import Recorder
-from dropanchor_service.security.folder import SecurityFolder
-from dropanchor_service.security.identity import Authenticator
-from dropanchor_service.store.omlox_items import OmloxItems
-
-if TYPE_CHECKING:
-    from dropanchor_service.basemap.basemap import ServedBasemap  # an extra
 
 PREFIX = "/api/v1"
 ALL_METHODS = ["DELETE", "GET", "HEAD", "PATCH", "POST", "PUT"]
@@ -48,55 +34,6 @@ DASHBOARD = Path(__file__).parent.parent / "dashboard"
 
 
 def create_app(
-    answers: Answers,
-    *,
-    ready: Ready,
-    registry: CollectorRegistry,
-    stopping: Event,
-    receive: Receive,
-    receive_health: Receive,
-    impaired: Impaired = list,
-    recorder: Recorder | None = None,
-    max_tags: int = 20_000,
-    dashboard: Path | None = DASHBOARD,
-    endpoints: tuple[str, ...] = (),
-    credentials: SecurityFolder | None = None,
-    authenticator: Authenticator | None = None,
-    rate_limiter: RateLimiter | None = None,
-    cors_origins: Sequence[str] = (),
-    events: EventParts | None = None,
-    omlox: OmloxItems | None = None,
-    plans: PlanStore | None = None,
-    basemap: "ServedBasemap | None" = None,
-) -> FastAPI:
-    """Return the application with all routes and middleware.
-
-    ready: returns whether the service can do its work, and the reasons when it cannot. impaired: returns what else does
-    not work. stopping: ends the streams when set. receive, receive_health: take samples and health that come over HTTP.
-    recorder: None when there is no folder for recordings. dashboard: the folder of the page; None for no page.
-    endpoints: those of the Zenoh router, as configured. credentials: those of the tags; None when they need none.
-    authenticator: None when every client may do everything. rate_limiter: limits the requests of each client; None for
-    no limit. cors_origins: of other web pages that may use the interface. events: zones, events and destinations; None
-    keeps them in memory and watches nothing. plans: floor plans; None keeps them in memory. omlox: what omlox clients
-    have said; None for no omlox interface. basemap: None when there is none.
-    """
-    parts = SiteParts(
-        answers,
-        receive,
-        receive_health,
-        plans or PlanStore(None),
-        events or EventParts.in_memory(answers.site.site.id, lambda: answers.now_ns()),
-        recorder,
-        max_tags,
-        omlox,
-    )
-    parts.events.note_changes(answers.site, parts.plans, omlox)
-    border = Border(origins=cors_origins)
-    shared = SharedParts(stopping, endpoints, credentials, authenticator, rate_limiter, border, basemap)
-    return create_app_of([parts], shared, ready=ready, impaired=impaired, registry=registry, dashboard=dashboard)
-
-
-def create_app_of(
     sites: Sequence[SiteParts],
     shared: SharedParts,
     *,
@@ -105,10 +42,11 @@ def create_app_of(
     registry: CollectorRegistry,
     dashboard: Path | None = DASHBOARD,
 ) -> FastAPI:
-    """Return the application of one or several sites; see `create_app`. Each has its routes below its id.
+    """Return the application of one or several sites. Each has its routes below its id.
 
     An only site has them also without. With several, the page shows the site in its address, `/?site=…`, and without
-    one the overview of the sites takes its place.
+    one the overview of the sites takes its place. ready: returns whether the service can do its work, and the reasons
+    when it cannot. impaired: returns what else does not work. dashboard: the folder of the page; None for no page.
     """
     served = SitesOfApp(sites)
     app = _app_without_routes(shared, served)

@@ -17,6 +17,10 @@ from dropanchor_service.api.app import create_app
 from dropanchor_service.api.http.site_in_path import OMLOX_PREFIX
 from dropanchor_service.api.omlox.document import document_of
 from dropanchor_service.api.omlox.router import described_routes
+from dropanchor_service.api.routes.shared_parts import SharedParts
+from dropanchor_service.api.routes.site_parts import SiteParts
+from dropanchor_service.delivery.event_parts import EventParts
+from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.omlox_items import OmloxItems
 
@@ -26,15 +30,17 @@ FILE = Path(dropanchor_schemas.__file__).parent / "openapi.json"
 def application(omlox: OmloxItems | None = None) -> FastAPI:
     """Return the application of an only site. omlox: None for no omlox interface."""
     answers = Answers(SiteStore(Site(), {}), TagTable(), LatestPoses())
-    return create_app(
+    site = SiteParts(
         answers,
-        ready=lambda: (True, []),
-        registry=CollectorRegistry(),
-        stopping=Event(),
         receive=lambda _tag, _payload, _encoding: None,
         receive_health=lambda _tag, _payload, _encoding: None,
-        dashboard=None,
+        plans=PlanStore(None),
+        events=EventParts.in_memory(answers.site.site.id),
         omlox=omlox,
+    )
+    registry = CollectorRegistry()
+    return create_app(
+        [site], SharedParts(Event()), ready=lambda: (True, []), impaired=list, registry=registry, dashboard=None
     )
 
 

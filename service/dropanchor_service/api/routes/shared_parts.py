@@ -47,6 +47,6 @@ class SharedParts:
 
 
 def shared_of(connection: HTTPConnection) -> SharedParts:
-    """Return those of the application that a request came to: `create_app_of` puts them into its state."""
+    """Return those of the application that a request came to: `create_app` puts them into its state."""
     shared: SharedParts = connection.app.state.shared
     return shared

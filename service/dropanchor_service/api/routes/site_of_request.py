@@ -1,6 +1,6 @@
 """Find the site that a request is about: the one in its path, or the only one.
 
-Routes know neither sites nor applications: `create_app_of` puts the sites into the state of the application.
+Routes know neither sites nor applications: `create_app` puts the sites into the state of the application.
 """
 
 from collections.abc import Callable, Iterator, Sequence

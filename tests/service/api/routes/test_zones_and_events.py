@@ -7,35 +7,23 @@ from typing import Any
 import httpx
 import pytest
 from fastapi import FastAPI
-from prometheus_client import CollectorRegistry
 
 from dropanchor_schemas.alarms import AlarmList
 from dropanchor_schemas.events import Event, EventList
 from dropanchor_schemas.zones import EventType
-from dropanchor_service.api import create_app
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.delivery.event_parts import EventParts
 from dropanchor_service.events.drafts import AlarmBegan, AlarmsOver, Draft, StateKey, StateValue
 from dropanchor_service.zones.items import ZoneItems
-from support.api import ApiBench, ask, kind_of, make_api_bench
+from support.api import ask, kind_of, make_api_bench
 from support.http_server import running_server
 
 ZONE = examples.ZONE | {"z_min_m": None, "z_max_m": None}
 RULE = examples.RULE
 
 
-def app_of(parts: EventParts, bench: ApiBench | None = None) -> FastAPI:
-    bench = bench or make_api_bench()
-    return create_app(
-        bench.answers,
-        ready=lambda: (True, []),
-        registry=CollectorRegistry(),
-        stopping=bench.stopping,
-        receive=lambda *_: None,
-        receive_health=lambda *_: None,
-        dashboard=None,
-        events=parts,
-    )
+def app_of(parts: EventParts) -> FastAPI:
+    return make_api_bench().app(events=parts)
 
 
 def happen(parts: EventParts, *tags: str, zone: str = "dock", **data: Any) -> None:
@@ -172,7 +160,7 @@ def test_alarms_are_listed_and_acknowledged_and_the_trail_names_who_did() -> Non
 def test_a_stream_begins_after_the_last_id_and_goes_on_with_new_events() -> None:
     parts, bench = EventParts.in_memory("yard"), make_api_bench()
     happen(parts, "a", "b", "a")
-    with running_server(app_of(parts, bench), bench.stopping) as port, httpx.Client() as client:
+    with running_server(bench.app(events=parts), bench.stopping) as port, httpx.Client() as client:
         url, headers = f"http://127.0.0.1:{port}/api/v1/events/stream?tags=a", {"last-event-id": "1"}
         with client.stream("GET", url, headers=headers) as stream:
             lines = (line for line in stream.iter_lines() if line.startswith("id: "))
