@@ -1,7 +1,6 @@
 """The application until the service is ready: the page, and answers that say what the service still does."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 from fastapi import FastAPI
 from prometheus_client.registry import Collector, CollectorRegistry
@@ -41,7 +40,6 @@ class Gate:
 
 def create_starting_app(
     reason: Callable[[], str],
-    dashboard: Path = DASHBOARD,
     gauges: Collector | None = None,
     border: Border = ANY_HOST,
 ) -> FastAPI:
@@ -68,5 +66,5 @@ def create_starting_app(
     async def refuse() -> None:
         raise ProblemError(Kind.NOT_READY, reason())
 
-    app.router.routes.extend(page_mounts(dashboard))
+    app.router.routes.extend(page_mounts(DASHBOARD))
     return app

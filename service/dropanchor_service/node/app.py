@@ -4,7 +4,6 @@ import re
 import secrets
 from collections.abc import Callable, Iterable
 from contextlib import AbstractAsyncContextManager
-from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
@@ -46,7 +45,6 @@ def create_node_app(
     authenticator: Authenticator | None = None,
     rate_limiter: RateLimiter | None = None,
     border: Border = ANY_HOST,
-    dashboard: Path = DASHBOARD,
 ) -> FastAPI:
     """Return the application. The page, health and metrics are of the node itself; `gateway` has the rest.
 
@@ -61,7 +59,7 @@ def create_node_app(
     app.add_middleware(SecurityHeaders)
     allow_origins(app, border.origins)
     add_error_handlers(app)
-    page = page_mounts(dashboard)
+    page = page_mounts(DASHBOARD)
     of_metrics = _metrics_app(registry, owners, authenticator, rate_limiter)
     metrics = [Route(path, of_metrics, methods=["GET"]) for path in ("/metrics", TARGETS)]
     app.router.routes.extend([FrontPage(gateway, page[-1], owners), *page, *metrics])

@@ -53,13 +53,13 @@ def tag_name(index: int) -> str:
     return f"sim-{index + 1}"
 
 
-def start_poses(count: int, seed: int = 0, scenario: str = YARD, mount_rad: float = 0.0) -> list[StartPose]:
+def start_poses(count: int, seed: int = 0, scenario: str = YARD) -> list[StartPose]:
     """Return the true start poses of the tags of `deliveries` with the same count, seed and scenario."""
     if scenario == YARD:
         starts = [_wanderer(seed, index, YARD_IMU_HZ).start for index in range(count)]
-        return [StartPose(start.x, start.y, start.course - mount_rad) for start in starts]
+        return [StartPose(start.x, start.y, start.course) for start in starts]
     motions = [trajectory(scenario, seed + index) for index in range(count)]
-    return [StartPose(float(m.x[0]), float(m.y[0]), float(m.course[0]) - mount_rad) for m in motions]
+    return [StartPose(float(m.x[0]), float(m.y[0]), float(m.course[0])) for m in motions]
 
 
 def deliveries(

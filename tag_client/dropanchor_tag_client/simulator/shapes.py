@@ -90,7 +90,7 @@ def tum_letters() -> Trajectory:
     return polyline(TUM_CORNERS, speed=0.8, turn_s=1.5, rest_s=3.0)
 
 
-def polyline(corners: Sequence[Point], speed: float, turn_s: float, rest_s: float, dt: float = 0.01) -> Trajectory:
+def polyline(corners: Sequence[Point], speed: float, turn_s: float, rest_s: float) -> Trajectory:
     """Return straight lines from corner to corner. At each corner the tag stops for turn_s + 0.5 s and turns."""
     segments = [Segment(rest_s, 0.0)]
     courses = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(corners)]
@@ -101,4 +101,4 @@ def polyline(corners: Sequence[Point], speed: float, turn_s: float, rest_s: floa
         # Ramps of equal length at both ends: the leg covers speed · duration exactly.
         segments += [Segment(math.dist(a, b) / speed, speed), Segment(0.5, 0.0)]
         course = wanted
-    return drive([*segments, Segment(1.0, 0.0)], Start(*corners[0], courses[0]), dt)
+    return drive([*segments, Segment(1.0, 0.0)], Start(*corners[0], courses[0]), dt=0.01)
