@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +10,8 @@ from pymap3d.enu import geodetic2enu
 
 from dropanchor_schemas.plans import ControlPoint, Plan
 from dropanchor_schemas.site import Anchor, Georeference, Site
-from dropanchor_service.security.api_keys import SOURCE, ApiKeys
-from dropanchor_service.security.identity import Authenticator, Scope
 from service.dashboard.plan_place import PlanPlace, plan_place
-from support.browser import WatchedPage, open_page, watched_page
+from support.browser import WatchedPage, watched_page
 from support.plan_files import geotiff_file, image_file, pdf_file, svg_file
 from support.zenoh_router import wait_until
 
@@ -188,10 +185,12 @@ def test_a_plan_is_aligned_moved_and_changed_by_hand_and_deleted(chromium: Brows
 
         edit(page, panel, "shared")
         form.get_by_label("Name").fill("Mine")
+        page.page.route("**/api/v1/plans", lambda route: route.abort())  # the list has the older one until it is saved
         place.plans.put("shared", mine.model_copy(update={"name": "Theirs"}))
         form.get_by_role("button", name="Save plan").click()
         expect(outcome).to_contain_text("Somebody else changed this meanwhile")
         assert place.plans.all["shared"].name == "Theirs"
+        page.page.unroute("**/api/v1/plans")
         outcome.get_by_role("button", name="Take the newer one").click()
         expect(form.get_by_label("Name")).to_have_value("Theirs")
         form.get_by_role("button", name="Save plan").click()
@@ -214,7 +213,7 @@ def test_a_plan_is_aligned_moved_and_changed_by_hand_and_deleted(chromium: Brows
         page.page.keyboard.press("Control+z")
         wait_until(lambda: place.plans.all.get("shared") == plan)
         page.wait_for("dropanchor.plans().length === 3")
-        assert [error for error in page.errors if "412" not in error] == []
+        assert [error for error in page.errors if "412" not in error and "ERR_FAILED" not in error] == []
 
 
 def test_the_map_shows_the_pixels_of_the_plan_in_light_and_inverted_in_dark(
@@ -315,25 +314,3 @@ def test_a_point_is_placed_by_latitude_and_longitude(chromium: Browser) -> None:
         east, north, _ = geodetic2enu(52.5021, 13.3982, 0.0, origin.lat, origin.lon, 0.0)
         there = complex(east, north) * complex(math.cos(-0.4), math.sin(-0.4))
         assert abs(complex(point.x, point.y) - there) < 0.01
-
-
-@pytest.mark.parametrize(("scope", "edits", "deletes"), [(Scope.READ, 0, 0), (Scope.WRITE, 1, 0), (Scope.ADMIN, 1, 1)])
-def test_a_key_shows_the_plans_and_only_the_buttons_that_it_may_use(
-    chromium: Browser, tmp_path: Path, scope: Scope, edits: int, deletes: int
-) -> None:
-    keys = ApiKeys(tmp_path)
-    secret = keys.add("somebody", scope)
-    with (
-        plan_place(authenticator=Authenticator({SOURCE: keys})) as place,
-        open_page(chromium, place.url) as page,
-    ):
-        place.put("hall", svg_file('<rect width="100" height="50" fill="red"/>'))
-        page.page.locator("#key").fill(secret)
-        with page.page.expect_response(lambda response: response.url.endswith("/api/v1/access")):
-            page.page.get_by_role("button", name="Open").click()
-        page.wait_for("dropanchor.plans()[0]?.isReady")
-        expect(page.page.get_by_role("button", name="Set up floor plans")).to_have_count(edits)
-        if edits:
-            form = edit(page, open_panel(page), "hall")
-            expect(form.get_by_role("button", name="Save plan")).to_be_visible()
-            expect(form.get_by_role("button", name="Delete…")).to_have_count(deletes)

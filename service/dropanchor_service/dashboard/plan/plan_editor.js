@@ -153,7 +153,7 @@ export class PlanEditor extends EventTarget {
     const { points, ...plan } = { ...draft, control_points: draft.points.filter(isPlaced) };
     const done = await this.changes.edit(t("plans.changed", { plan: draft.name || draft.id }), pathOf(draft.id), plan, seen, () => this.#takeNewer(draft.id));
     await this.store.refresh(); // first, so that the map does not show the old plan in between
-    if (done && this.draft === draft) this.discard();
+    if (done && (this.draft === draft || !this.#isDirty)) this.discard(); // it was read again, or nothing was typed meanwhile
   }
 
   async remove() {
