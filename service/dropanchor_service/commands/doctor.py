@@ -38,6 +38,7 @@ examples:
 EXIT_FOUND = 1
 REFUSED = (RefusedError,)
 CLOCK_S = 2.0
+PAST_S = 330.0  # longer than a busy service takes at most to run a moment of the past again
 DAY_NS = 86_400_000_000_000
 FEW_RANGES = 10  # a share of fewer tells nothing
 MOST = 0.5
@@ -131,7 +132,7 @@ def _of_tag(arguments: argparse.Namespace) -> Iterator[Finding]:
 def _explanation(arguments: argparse.Namespace, path: str, at_ns: int) -> Mapping[str, Any]:
     """Return the explanation at a time; without a black box, that of now. Raises RefusedError."""
     try:
-        found: Mapping[str, Any] = asked(arguments, "GET", f"{path}/explain?at={at_ns}&last=300")
+        found: Mapping[str, Any] = asked(arguments, "GET", f"{path}/explain?at={at_ns}&last=300", timeout_s=PAST_S)
     except RefusedError as error:
         if arguments.at is not None or error.status not in (HTTPStatus.CONFLICT, HTTPStatus.NOT_FOUND):
             raise

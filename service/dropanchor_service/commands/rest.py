@@ -25,16 +25,18 @@ def add_rest_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ca", type=Path, metavar="FILE", help="CA certificate of the service, for https")
 
 
-def asked(arguments: argparse.Namespace, method: str, path: str, body: Any = None) -> Any:
+def asked(arguments: argparse.Namespace, method: str, path: str, body: Any = None, timeout_s: float = TIMEOUT_S) -> Any:
     """Return the JSON of the answer. path: after `/api/v1`. Raises RefusedError."""
-    with opened(arguments, method, path, body) as answer:
+    with opened(arguments, method, path, body, timeout_s) as answer:
         try:
             return json.load(answer)
         except (OSError, HTTPException, ValueError) as error:
             raise RefusedError(f"{arguments.url} gave no complete answer ({error})") from error
 
 
-def opened(arguments: argparse.Namespace, method: str, path: str, body: Any = None) -> HTTPResponse:
+def opened(
+    arguments: argparse.Namespace, method: str, path: str, body: Any = None, timeout_s: float = TIMEOUT_S
+) -> HTTPResponse:
     """Return the answer, to be read and closed. Raises RefusedError."""
     headers = {"content-type": "application/json"}
     if os.environ.get(KEY_VARIABLE):
@@ -44,7 +46,7 @@ def opened(arguments: argparse.Namespace, method: str, path: str, body: Any = No
     trusted = ssl.create_default_context(cafile=arguments.ca) if url.startswith("https:") else None
     try:
         request = Request(url, data, headers, method=method)
-        answer: HTTPResponse = urlopen(request, timeout=TIMEOUT_S, context=trusted)
+        answer: HTTPResponse = urlopen(request, timeout=timeout_s, context=trusted)
     except HTTPError as error:
         with error:
             refused = RefusedError(_reason(error))
