@@ -25,7 +25,7 @@ def test_a_service_starts_with_a_damaged_cache(tmp_path: Path, monkeypatch: pyte
     whole = bytearray(code.read_bytes())
     whole[len(whole) // 2] ^= 0x80
     code.write_bytes(whole)
-    with nullcontext() if has_room else full_disk(), running_service(forked=False) as service:
+    with nullcontext() if has_room else full_disk(), running_service() as service:
         said = "".join(service.log)
     assert f"2 files of the compiled estimator in {cache} are damaged" in said
     assert "Traceback" not in said

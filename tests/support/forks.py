@@ -55,6 +55,7 @@ while True:
     asked.send(b"%d" % answer)
 """
 _READ_AT_IMPORT = ("LD_", "MALLOC_", "NUMBA_", "OMP_", "OPENBLAS_", "PYTHON", "ZENOH_")
+_ENVIRONMENT = environment()  # before any test changes it, whichever comes first
 
 
 class Forked:
@@ -90,15 +91,14 @@ class Forked:
 
 
 class Server:
-    """The process that forks. environment: of what it forks, so far as it is read by imports."""
+    """The process that forks. Of its environment the forks have what is read by imports."""
 
-    def __init__(self, environment: dict[str, str]) -> None:
-        self.read = read_at_import(environment)
+    def __init__(self) -> None:
         self._lock = threading.Lock()
         self._socket, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with its:
             program = [sys.executable, "-c", _PROGRAM, str(its.fileno())]
-            self._process = subprocess.Popen(program, pass_fds=[its.fileno()], env=environment)
+            self._process = subprocess.Popen(program, pass_fds=[its.fileno()], env=_ENVIRONMENT)
 
     def close(self) -> None:
         self._socket.close()
@@ -124,14 +124,14 @@ def read_at_import(environment: dict[str, str]) -> dict[str, str]:
 
 @functools.cache
 def _server() -> Server:
-    server = Server(environment())
+    server = Server()
     atexit.register(server.close)
     return server
 
 
 def can_be_forked() -> bool:
     """Return whether what imports read of the environment is the same as for the other programs."""
-    return read_at_import(environment()) == _server().read
+    return read_at_import(environment()) == read_at_import(_ENVIRONMENT)
 
 
 def start_forked(words: Sequence[str], environment: dict[str, str], before: str = "", stdout: int = 1) -> Forked:

@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[2]
 _REST = """
 import numpy as np
 
+from dropanchor_evaluation.bounds.linear import LinearModel
 from dropanchor_evaluation.paper.compiled import algorithm1
 from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_front_end, warm_up_ingest, warm_up_zones
 from dropanchor_service.estimation.paper.parameters import TUNED
@@ -24,6 +25,12 @@ from dropanchor_service.estimation.paper.parameters import TUNED
 for warm_up in (warm_up_front_end, warm_up_ingest, warm_up_answers, warm_up_zones):
     warm_up()
 algorithm1(np.arange(2.0), np.zeros(2), np.ones(2), (1.0, 0.0, 0.0), TUNED)
+model = LinearModel(2)
+for name in "xy":
+    model.state(name, 1.0)
+model.move("x", "y", 1.0)
+model.observe(1.0, {"x": 1.0})
+model.bound(draws=0, seed=0)
 """
 
 
