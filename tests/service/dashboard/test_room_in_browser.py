@@ -38,12 +38,16 @@ SHARE_OF_TOOLS = """() => {
 }"""
 
 
-@pytest.fixture
-def site() -> Iterator[ZonePlace]:
+def with_a_plan() -> PlanStore:
     plans = PlanStore(None)
     image = plans.add_image(read_plan(image_file(200, 100), Request(media_type="image/png")))
     plans.put("hall", Plan(id="hall", image=image, placement=Placement(x=0, y=0, m_per_px=0.05)))
-    with set_up_place(plans) as place:
+    return plans
+
+
+@pytest.fixture
+def site() -> Iterator[ZonePlace]:
+    with set_up_place(with_a_plan()) as place:
         place.move(*(f"forklift-{number}" for number in range(5)), x=[-3.0, -1.0, 0.0, 1.0, 3.0], y=1.0)
         yield place
 

@@ -2,19 +2,14 @@
 
 import math
 import re
-from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Locator, Response, Route, expect
 
 from dropanchor_schemas.site import TagSettings
-from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State, StateReason
-from dropanchor_service.security.api_keys import SOURCE, ApiKeys
-from dropanchor_service.security.identity import Authenticator, Scope
-from service.dashboard.place import Place, live_api_bench
-from support.browser import WatchedPage, open_page, watched_page
-from support.http_server import running_server
+from service.dashboard.place import Place
+from support.browser import WatchedPage, watched_page
 from support.zenoh_router import wait_until
 
 pytestmark = pytest.mark.browser
@@ -52,8 +47,7 @@ def test_a_name_a_colour_and_a_group_show_on_the_list_and_the_map_of_every_page(
         assert given == TagSettings(name="Forklift 1", colour="#d97a0a", group="forklifts")
         expect(other.page.locator("tr[data-tag='cart'] .name")).to_have_text("Forklift 1")
         other.wait_for_map(2)
-        x, y = next(tag["pixel"] for tag in other.tags().values() if tag["tag"] == "cart")
-        other.wait_for("dropanchor.drawing().still")
+        x, y = other.tags()["cart"]["pixel"]
         assert other.pixel(x, y - 8.5)[:3] == pytest.approx((0xD9, 0x7A, 0x0A), abs=40)
         other.page.get_by_label("Group to show").select_option("forklifts")
         expect(other.page.locator("#count")).to_have_text("1 of 2 tags")
@@ -226,26 +220,3 @@ def test_a_deleted_tag_leaves_every_page(chromium: Browser, place: Place) -> Non
             expect(one.page.locator("tr[data-tag='cart']:not([hidden])")).to_have_count(0)
             expect(one.page.locator("#count")).to_have_text("1 tag")
         assert page.errors == other.errors == []
-
-
-@pytest.mark.parametrize(("scope", "edits", "deletes"), [(Scope.READ, False, False), (Scope.WRITE, True, False)])
-def test_a_key_sees_only_the_buttons_that_it_may_use(
-    chromium: Browser, tmp_path: Path, scope: Scope, edits: bool, deletes: bool
-) -> None:
-    bench = live_api_bench()
-    keys = ApiKeys(tmp_path)
-    secret = keys.add("person", scope)
-    app = bench.app(DASHBOARD, authenticator=Authenticator({SOURCE: keys}))
-    with running_server(app, bench.stopping) as port, open_page(chromium, f"http://127.0.0.1:{port}/") as page:
-        Place(bench, "").move("cart", x=1.0, y=2.0)
-        page.page.locator("#key").fill(secret)
-        with page.page.expect_response(lambda response: response.url.endswith("/access")):
-            page.page.get_by_role("button", name="Open").click()
-        page.page.locator("tr[data-tag='cart']").click()
-        summary = page.page.locator("#detail .settings > summary")
-        if edits:
-            summary.click()
-        expect(summary).to_be_visible(visible=edits)
-        expect(page.page.get_by_role("button", name="Set up anchors")).to_be_visible(visible=edits)
-        expect(page.page.get_by_role("button", name="Save settings")).to_be_visible(visible=edits)
-        expect(page.page.get_by_role("button", name="Delete tag…")).to_be_visible(visible=deletes)
