@@ -14,6 +14,7 @@ from playwright.sync_api import expect
 
 from dropanchor_service.api.help.documents import FOLDER, documents
 from support.browser import PausedBrowser, open_page
+from support.patience import PATIENCE_S
 from support.service import ROOT, environment
 
 
@@ -71,7 +72,7 @@ def test_the_site_is_searched_without_another_server(address: str, shared_chromi
 
 def test_the_wheel_of_the_service_has_the_pages_where_it_looks_for_them(tmp_path: Path) -> None:
     build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
-    subprocess.run(build, cwd=ROOT / "service", check=True, capture_output=True, timeout=120)
+    subprocess.run(build, cwd=ROOT / "service", check=True, capture_output=True, timeout=PATIENCE_S)
     (wheel,) = tmp_path.glob("*.whl")
     with ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "installed")
@@ -82,7 +83,7 @@ def test_the_wheel_of_the_service_has_the_pages_where_it_looks_for_them(tmp_path
         check=True,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE_S,
     )
     assert done.stdout.split() == [str(tmp_path / "installed" / "dropanchor_service" / "docs"), str(len(documents()))]
     assert FOLDER == ROOT / "service" / "docs"

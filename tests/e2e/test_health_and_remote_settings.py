@@ -49,9 +49,9 @@ def test_health_over_zenoh_and_http_is_shown_and_bad_values_are_counted(service:
 
 def test_settings_reach_a_program_at_its_start_and_on_change_and_are_acknowledged(service: Running) -> None:
     service.put("/api/v1/tags/b/settings", {})
-    assert patch(service, "b", {"batch_s": 0.5}).status_code == 200
+    assert patch(service, "b", {"batch_s": 5.0}).status_code == 200
     with TagClient("b", connect=service.zenoh, batch_samples=1) as tag, Upkeep([tag]):
-        wait_until(lambda: acknowledged(service, "b") == {"batch_s": 0.5})
+        wait_until(lambda: acknowledged(service, "b") == {"batch_s": 5.0})
         for _ in range(50):
             tag.publish_range(1, 1.0)
         assert tag.sent.messages == 1

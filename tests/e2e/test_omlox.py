@@ -8,6 +8,7 @@ from urllib.parse import urlsplit
 from dropanchor_service.api.omlox.models import FenceEvent, TrackableMotion
 from support.live_tags import LiveTags
 from support.omlox import Socket, socket_to
+from support.patience import PATIENCE_S
 from support.service import Running, running_service
 from support.zenoh_router import free_endpoint
 
@@ -40,7 +41,7 @@ def test_a_client_follows_tags_and_a_fence_and_finds_its_objects_after_a_kill(tm
 def first(socket: Socket, topic: str) -> Any:
     """Return the first object of a topic."""
     while True:
-        message = socket.next(60.0)
+        message = socket.next(PATIENCE_S)
         if message["topic"] == topic:
             return message["payload"][0]
 

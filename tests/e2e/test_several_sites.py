@@ -195,7 +195,7 @@ def _check_answers(service: Running, session: zenoh.Session) -> None:
     assert ask(session, keys.pose_key("south", "cart")).keys() == {keys.pose_key("south", "cart")}
     assert ask(session, keys.pose_key("west", "cart")) == {}
     assert ask(session, keys.anchor_key("south", "7"))[keys.anchor_key("south", "7")]["x"] == 100.0
-    sites = service.get("/api/v1/sites")["sites"]
-    assert [(site["site"], site["tags"], site["online"]) for site in sites] == [("north", 1, 1), ("south", 1, 1)]
+    wait_until(lambda: [one["online"] for one in service.get("/api/v1/sites")["sites"]] == [1, 1])
+    assert [(one["site"], one["tags"]) for one in service.get("/api/v1/sites")["sites"]] == [("north", 1), ("south", 1)]
     assert service.ask("GET", "/api/v1/poses").status_code == 404
     assert service.metric('dropanchor_rejected_total{reason="key_invalid"}') == 0

@@ -17,6 +17,7 @@ import pytest
 from dropanchor_service import cli
 from dropanchor_service.settings.sources import load_settings
 from dropanchor_tag_client import cli as tag_cli
+from support.patience import PATIENCE_S
 from support.samples import Sample, called, samples
 from support.service import ROOT
 
@@ -43,7 +44,7 @@ def named(all_of_them: list[Sample]) -> pytest.MarkDecorator:
 
 @named(SHELL)
 def test_a_script_is_one_of_the_shell(sample: Sample) -> None:
-    subprocess.run(["bash", "-n"], input=sample.text, text=True, check=True, timeout=20)
+    subprocess.run(["bash", "-n"], input=sample.text, text=True, check=True, timeout=PATIENCE_S)
 
 
 @named([sample for sample in SHELL if called(sample.text, "dropanchor")])

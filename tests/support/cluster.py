@@ -171,8 +171,9 @@ class Cluster:
         return bool(self._rows("SELECT 1 FROM dropanchor_node WHERE seen > clock_timestamp() - interval '2 s'"))
 
     def address(self, bucket: str) -> str:
-        """Return the address of the page of the owner."""
-        return str(dict(self._rows("SELECT bucket, address FROM dropanchor_lease"))[bucket])
+        """Return the address of the page of the owner, once it has told it."""
+        statement = "SELECT bucket, address FROM dropanchor_lease"
+        return str(wait_until(lambda: dict(self._rows(statement)).get(bucket)))
 
     def standbys(self) -> list[str]:
         """Return the shards that stand by."""

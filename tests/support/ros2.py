@@ -11,6 +11,8 @@ from typing import Any
 
 import zenoh
 
+from support.patience import PATIENCE_S
+
 HEADER = b"\x00\x01\x00\x00"  # plain CDR, little-endian
 IMU = "sensor_msgs::msg::dds_::Imu_/RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"
 RANGE = "sensor_msgs::msg::dds_::Range_/RIHS01_b42b62562e93cbfe9d42b82fe5994dfa3d63d7d5c90a317981703f7388adff3a"
@@ -151,5 +153,5 @@ class Robot:
     def tokens(self) -> set[str]:
         """Return the liveliness keys of all ROS entities of the domain."""
         where = "@/*/@ros2_lv/**" if self.dds else f"@ros2_lv/{self.domain}/**"
-        replies = self.session.liveliness().get(where, timeout=5.0)
+        replies = self.session.liveliness().get(where, timeout=PATIENCE_S)
         return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}

@@ -17,6 +17,7 @@ import dropanchor_service
 from dropanchor_schemas.sentences import phrase_of
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.plausibility.verdicts import SENTENCES
+from support.patience import PATIENCE_S
 
 PACKAGES = tuple(Path(str(package.__file__)).parent for package in (dropanchor_schemas, dropanchor_service))
 PREFIX = "say."
@@ -100,5 +101,5 @@ def _run(program: str, language: str, text: str) -> Any:
     if node is None:
         pytest.skip("node is not installed: this test runs a module of the page")
     command = [node, "--input-type=module", "--eval", program, str(DASHBOARD), language]
-    run = subprocess.run(command, input=text, capture_output=True, text=True, timeout=60, check=True)
+    run = subprocess.run(command, input=text, capture_output=True, text=True, timeout=PATIENCE_S, check=True)
     return json.loads(run.stdout)

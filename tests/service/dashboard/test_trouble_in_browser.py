@@ -26,9 +26,8 @@ def busy_place() -> ZonePlace:
         disc("press", 100.0, 0.0, 5.0, name="Press 4", enter_severity=Severity.ALARM),
         disc("lane", -100.0, 0.0, 5.0, name="Slow lane", speed_mps=1.0, speed_severity=Severity.WARNING),
     )
-    fresh_ns = time.time_ns() + 600 * SECOND  # none is lost because the page takes its time
     for number in range(TAGS):
-        place.move(f"cart-{number}", x=float(number % 20), y=float(number // 20), state=State.TRACKING, t_ns=fresh_ns)
+        place.move(f"cart-{number}", x=float(number % 20), y=float(number // 20))
     return place
 
 

@@ -66,6 +66,7 @@ def test_zones_are_undone_step_by_step_while_they_are_drawn_and_after_they_are_s
         expect(corner).not_to_have_attribute("aria-label", before)
         form.get_by_role("button", name="Save zone").click()
         said(outcome, "Shape of zone Ramp changed.")
+        expect(form).to_be_hidden()
         assert corner_of(yard, "ramp") != [1.0, 1.0]
         page.keyboard.press("Control+z")  # nothing has the focus
         said(outcome, "Undone: Shape of zone Ramp changed.")
@@ -79,6 +80,7 @@ def test_zones_are_undone_step_by_step_while_they_are_drawn_and_after_they_are_s
         name.fill("Gate")
         name.press("Enter")
         said(outcome, "Zone Ramp renamed to Gate.")
+        expect(form).to_be_hidden()
         page.get_by_role("button", name="Edit Gate").click()
         name.press("Control+z")  # nothing is typed in the field
         said(outcome, "Undone: Zone Ramp renamed to Gate.")
@@ -209,7 +211,7 @@ def test_rules_destinations_tags_and_anchors_are_undone(chromium: Browser, yard:
         yard.move("cart", x=9.0, y=9.0)
         watched.wait_for("dropanchor.trail('cart').includes(9)")
         yard.move("cart", x=5.0, y=5.0)
-        watched.wait_for("dropanchor.trail('cart').includes(5)")
+        watched.wait_for("dropanchor.tags().some(({ tag, x }) => tag === 'cart' && x === 5)")
         settings.get_by_label("Colour").press("Control+z")
         said(outcome, "Undone: Start of cart set.")
         watched.wait_for("!dropanchor.trail('cart').includes(9)")

@@ -51,7 +51,8 @@ def test_units_are_chosen_remembered_and_used_everywhere_while_settings_stay_si(
         expect(fast).to_have_value("5.592")
         page.locator("#zone-form").get_by_label("Name").fill("Pier")
         page.get_by_role("button", name="Save zone").click()
-        wait_until(lambda: place.zones["dock"].name == "Pier")
+        expect(page.locator("#zone-form")).to_be_hidden()
+        assert place.zones["dock"].name == "Pier"
         assert (radius_of(place), place.zones["dock"].speed_mps) == (3.048, 2.5)
         page.get_by_role("button", name="Edit Pier").click()
         radius.fill("20")

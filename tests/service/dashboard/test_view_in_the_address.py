@@ -1,6 +1,5 @@
 """The address of the page holds the view: a copied link shows the same tag, map, filter, language and units."""
 
-import time
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
@@ -30,8 +29,7 @@ def values_in(page: WatchedPage) -> dict[str, list[str]]:
 @pytest.fixture
 def fleet(place: Place) -> Place:
     names = [f"cart-{number}" for number in range(5)]
-    states, fresh_ns = [State.TRACKING] * 5 + [State.LOST], time.time_ns() + 60_000_000_000
-    place.move(*names, "süd & co", x=np.arange(6.0), y=1.0, state=states, t_ns=fresh_ns)
+    place.move(*names, "süd & co", x=np.arange(6.0), y=1.0, state=[State.TRACKING] * 5 + [State.LOST])
     place.bench.answers.site.set_tag("cart-1", TagSettings(group="forklifts"))
     return place
 

@@ -32,8 +32,8 @@ class ZonePlace(Place):
             self.parts.items.zones.put(zone.id, zone)
 
     def go(self, tag: str, x: float, y: float, **fields: Any) -> None:
-        """Move a tag, and judge the zones."""
-        self.move(tag, x=x, y=y, **fields)
+        """Move a tag now, and judge the zones."""
+        self.move(tag, x=x, y=y, **({"t_ns": time.time_ns()} | fields))
         self.watch.turn()
 
     @property
