@@ -1,6 +1,7 @@
 """Set-up and fixtures for the whole suite."""
 
 import gc
+import logging
 import os
 import signal
 import sys
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import settings
 
+from dropanchor_service.runtime.repeats import CountingHandler
 from support.kernel_cache import use_cache_of_these_sources
 from support.outside import is_left_out, is_long, is_outside
 from support.patience import be_patient_with_http
@@ -74,6 +76,18 @@ def pytest_collection_finish() -> None:
 def _rank(item: pytest.Item) -> int:
     folder = item.path.relative_to(item.config.rootpath / "tests").parts[0]
     return FIRST.index(folder) if folder in FIRST else len(FIRST)
+
+
+@pytest.fixture(autouse=True)
+def _own_log() -> Iterator[None]:
+    """Take back what a command of the test did to the log: its later lines would fall into another test's output."""
+    level = logging.root.level
+    yield
+    logging.root.setLevel(level)
+    for handler in [one for one in logging.root.handlers if isinstance(one, CountingHandler)]:
+        logging.root.removeHandler(handler)
+        handler.stream = sys.stderr  # that of the test is closed
+        handler.close()
 
 
 @pytest.fixture(scope="session")
