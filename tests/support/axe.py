@@ -13,6 +13,7 @@ from support.browser import every_look
 from support.patience import PATIENCE_S
 
 _PACKAGE = "axe-core@4.10.3"
+_CHECKS = ("any", "all", "none")
 _RULES: tuple[dict[str, object], ...] = ({}, {"runOnly": ["color-contrast"]}, {})
 """Options for each look. The tablet's has the elements of the first one in other colours, so only these are checked."""
 
@@ -57,7 +58,7 @@ def violations(page: Page, axe: str, within: str = "html") -> list[str]:
     if not page.evaluate("'axe' in window"):
         page.evaluate(axe)
     return [
-        f"{look}: {rule['id']}: {node['target']} {node['failureSummary']}"
+        f"{look}: {rule['id']}: {node['target']} {[one['message'] for kind in _CHECKS for one in node[kind]]}"
         for look, rules in zip(every_look(page), _RULES, strict=True)
         for rule in page.evaluate(
             "([part, rules]) => axe.run(part, { reporter: 'no-passes', ...rules }).then((found) => found.violations)",

@@ -17,6 +17,7 @@ from support.plan_files import image_file
 
 pytestmark = pytest.mark.browser
 
+COMPLETE = "dropanchor.zones().yard >= 0 && dropanchor.destinations()[0] && dropanchor.plans()[0]?.isReady"
 ROWS = """() => {
     const box = document.getElementById("table").getBoundingClientRect();
     return [...document.querySelectorAll("#table tbody tr:not([hidden])")]
@@ -141,6 +142,7 @@ def test_on_a_phone_the_list_comes_first_in_a_sheet_and_one_button_stands_for_th
 ) -> None:
     with watched_page(chromium, site.url, size=(390, 844)) as page:
         page.wait_for_map(6)
+        page.wait_for(COMPLETE)
         aside, sheet = page.page.locator("aside"), page.page.get_by_role("separator", name="Height of the list")
         assert page.page.evaluate(ROWS) >= 4
         parts = ["map", "filter", "table", "events"]
@@ -161,7 +163,7 @@ def test_on_a_phone_the_list_comes_first_in_a_sheet_and_one_button_stands_for_th
         page.page.get_by_role("button", name="Pull the list up").click()
         assert height(aside) > 1.4 * before
         page.page.reload()
-        page.wait_for("window.dropanchor?.status() === 'live'")
+        page.wait_for(COMPLETE)
         assert height(aside) > 1.4 * before
         page.page.get_by_role("button", name="Put the list down").click()
         assert height(aside) == pytest.approx(before, abs=2)

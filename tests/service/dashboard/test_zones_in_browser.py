@@ -112,7 +112,7 @@ def test_the_lists_of_the_present_are_hidden_while_the_page_shows_the_past(chrom
 def test_events_come_live_and_newest_first_and_a_click_selects_tag_and_zone(chromium: Browser, yard: ZonePlace) -> None:
     yard.go("cart-3", 3.0, 3.0)
     with watched_page(chromium, yard.url) as page:
-        page.wait_for("dropanchor.events()")
+        page.wait_for("dropanchor.events() && 'yard' in dropanchor.zones()")
         events = page.page.locator("#events")
         expect(events.locator("summary")).to_contain_text("cart-3 entered Yard")
         events.locator("summary").click()

@@ -20,6 +20,8 @@ export class FirstHour {
     for (const button of /** @type {NodeListOf<HTMLElement>} */ (box.querySelectorAll("button[data-opens]"))) {
       button.addEventListener("click", () => openPart(button.dataset.opens ?? ""));
     }
+    const anchor = /** @type {HTMLAnchorElement} */ (partOf(box, "phone-link"));
+    write(anchor, anchor.href); // until the service has said how others reach it
     partOf(box, "simulate").addEventListener("click", () => changes.attempt(() => this.#simulate()));
   }
 
@@ -56,7 +58,7 @@ export class FirstHour {
   async #showPhone(link) {
     const anchor = /** @type {HTMLAnchorElement} */ (partOf(this.box, "phone-link"));
     anchor.href = link ?? "tag/";
-    write(anchor, link ?? new URL("tag/", document.baseURI).href);
+    write(anchor, anchor.href);
     writeOrHide(partOf(this.box, "phone-note"), link === null ? t("first.loopback") : link.startsWith("https:") ? "" : t("first.phone_https"));
     const code = /** @type {HTMLImageElement} */ (partOf(this.box, "phone-code"));
     code.hidden = true;
