@@ -22,7 +22,7 @@ def test_a_rejection_a_change_of_settings_and_silence_are_found_with_their_times
         assert doctor(yard.url) == Ended(0, "good  service: it is ready\n", "")
         junk = b'{"range": [{"t_ns": %d, "anchor": 7, "range_m": -1.0}]}' % time.time_ns()
         yard.ask("POST", f"/api/v1/ingest/samples?tag={TAG}", content=junk, headers={"content-type": ENCODING_JSON})
-        wait_until(lambda: yard.get(f"/api/v1/tags/{TAG}")["rejected"])
+        wait_until(lambda: "range_negative" in yard.get(f"/api/v1/tags/{TAG}")["rejected"])
         yard.put(f"/api/v1/tags/{TAG}/settings", {"mount_angle_rad": 1.5})
         found = doctor(yard.url, "--tag", TAG)
         assert found.returncode == 1, found.stderr
