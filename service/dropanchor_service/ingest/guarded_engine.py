@@ -233,10 +233,8 @@ class GuardedEngine:
         return sorted({row for column in unknown for row in column[~self._has_configured[column]].tolist()})
 
     def _reserve(self, rows: int) -> None:
-        missing = rows - len(self._has_configured)
-        if missing > 0:
-            spare = max(missing, len(self._has_configured))
-            self._has_configured = np.concatenate([self._has_configured, np.zeros(spare, bool)])
+        if rows > len(self._has_configured):
+            self._has_configured = enlarged(self._has_configured, max(rows, 2 * len(self._has_configured)))
 
     def _bisected(self, samples: SampleBatch, now_ns: int) -> Iterator[PoseBatch]:
         try:
