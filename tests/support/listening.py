@@ -23,8 +23,8 @@ class ReceivedFrames:
         packed = payload_encoding(str(message.encoding)) == ENCODING_PACKED
         frame = (decode_packed if packed else decode_json)(bytes(message.payload))
         assert isinstance(frame, Frame), frame
-        self.frames.append(frame)
         self.keys.append(str(message.key_expr))
+        self.frames.append(frame)  # the last, since tests wait for it
 
     def of(self, tag: str) -> list[Frame]:
         """Return the frames of one tag."""

@@ -143,7 +143,7 @@ def running_service(
         if process.poll() is None:
             process.kill()
         process.wait()
-        reader.join(5.0)
+        reader.join(PATIENCE_S)
         if process.stderr is not None:
             process.stderr.close()
 
