@@ -209,7 +209,13 @@ def open_page(
     page = watched.page
     prepare(page)
     page.on("pageerror", lambda error: watched.errors.append(str(error)))
-    page.on("console", lambda line: watched.errors.append(line.text) if line.type in ("error", "warning") else None)
+    page.on("console", lambda line: _note(watched.errors, line.type, line.text))
     page.goto(url)
     yield watched
     context.close()
+
+
+def _note(errors: list[str], kind: str, text: str) -> None:
+    """Note what the page logged, but not that the network of this machine changed, which is not its doing."""
+    if kind in ("error", "warning") and "ERR_NETWORK_CHANGED" not in text:
+        errors.append(text)
