@@ -136,7 +136,7 @@ function reveal(tag) {
 /** The plots make the panel taller. Scroll the table once, so that the row of the tag stays visible. */
 let revealedFor = /** @type {string | null} */ (null);
 evidence.addEventListener("change", () => {
-  if (choice.selected !== null && choice.selected !== revealedFor) table.reveal(choice.selected);
+  if (choice.selected !== null && choice.selected !== revealedFor) table.scrollTo(choice.selected);
   revealedFor = choice.selected;
 });
 

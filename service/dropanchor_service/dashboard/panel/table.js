@@ -90,10 +90,15 @@ export class TagTable {
     return row === undefined ? null : this.fleet.names[row];
   }
 
-  /** Scroll to a tag. @param {string} tag */
+  /** Scroll to a tag, from which arrow keys go on. @param {string} tag */
   reveal(tag) {
-    const place = this.#rows.indexOf(this.fleet.row(tag));
     this.#active = tag;
+    this.scrollTo(tag);
+  }
+
+  /** @param {string} tag */
+  scrollTo(tag) {
+    const place = this.#rows.indexOf(this.fleet.row(tag));
     if (place < 0) return;
     const [top, height] = [place * this.#rowHeight, this.box.clientHeight - this.#headHeight()];
     if (top < this.box.scrollTop) this.box.scrollTop = top;
