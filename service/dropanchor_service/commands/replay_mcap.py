@@ -122,8 +122,12 @@ class Outcome:
         if self.one_sided:
             yield (
                 f"recorded poses: {self.one_sided} not compared, because only the recording or only the replay has a "
-                "position, or knows north. This is normal if tags were already running when the recording started: "
-                "the replay starts with new estimators"
+                "position, or knows north"
+            )
+        if self.one_sided or self.equal < self.compared:
+            yield (
+                "Differences are normal for tags that were already running when the recording started: the replay "
+                "starts with new estimators"
             )
 
     def _compare(self) -> None:

@@ -24,8 +24,11 @@ def outcome(recorded: dict[str, Any], frame: Frame, x: float = 0.0, y: float = 0
 
 
 def test_places_in_the_same_frame_are_compared() -> None:
-    assert "1 compared, 0 equal within a nanometre, worst difference 5 m" in outcome(IN_SITE, Frame.SITE)
-    assert "1 compared, 1 equal within a nanometre, worst difference 0 m" in outcome(RELATIVE, Frame.RELATIVE, 3.0, 4.0)
+    different, same = outcome(IN_SITE, Frame.SITE), outcome(RELATIVE, Frame.RELATIVE, 3.0, 4.0)
+    assert "1 compared, 0 equal within a nanometre, worst difference 5 m" in different
+    assert "normal for tags that were already running when the recording started" in different
+    assert "1 compared, 1 equal within a nanometre, worst difference 0 m" in same
+    assert "normal" not in same
 
 
 def test_a_place_in_the_site_is_not_compared_with_one_in_a_frame_of_the_tags_own() -> None:
