@@ -12,6 +12,7 @@ from dropanchor_schemas.site import Anchor, Georeference, Site, TagSettings
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.delivery.channels import Channels
 from dropanchor_service.delivery.event_parts import EventParts
+from dropanchor_service.estimation.columns import State
 from dropanchor_service.history.storage import Retention
 from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
@@ -52,7 +53,7 @@ def walk_place(folder: Path, tags: int) -> Iterator[WalkPlace]:
 
 
 def _drive(place: WalkPlace, tags: int) -> None:
-    """Store how the tags drove, and leave them where poses stay fresh."""
+    """Store how the tags drove, and leave them where poses stay fresh. The last one is lost by now."""
     names, side = [f"tag-{number:03}" for number in range(1, tags + 1)], math.ceil(math.sqrt(tags))
     now_ns = time.time_ns()
     for second in range(0, PAST_S, STEP_S):
@@ -61,3 +62,4 @@ def _drive(place: WalkPlace, tags: int) -> None:
         place.move(*names, x=xs, y=ys, speed=0.5, t_ns=now_ns - (PAST_S - second) * SECOND)
     place.bench.write_history()
     place.move(*names, x=xs, y=ys, speed=0.5, range=5.0, t_ns=now_ns + 600 * SECOND)
+    place.move(names[-1], x=xs[-1], y=ys[-1], state=State.LOST, t_ns=now_ns + 600 * SECOND)

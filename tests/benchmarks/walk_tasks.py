@@ -37,6 +37,9 @@ class Tasks:
             "export a track": (self.export_by_menu, self.export_from_past, self.export_after_search),
             "rename and group a tag": (self.rename_by_menu, self.rename_by_click),
             "follow three tags": (self.follow_three, self.follow_three_on_phone),
+            "see who is lost": (self.lost,),
+            "see who is where": (self.headcount,),
+            "move an anchor, and undo that": (self.anchor, self.anchor_on_phone),
         }
 
     @property
@@ -254,3 +257,27 @@ class Tasks:
         walker.click(walker.button("^Folgen"))
         walker.see(lambda: walker.page.get_by_role("row", selected=True).locator("visible=true").count() == 3)
         walker.see(lambda: "follow" in walker.page.url)
+
+    def lost(self, walker: Walker) -> None:
+        walker.click(walker.button("^Verloren"))
+        walker.see(lambda: walker.page.get_by_text(f"1 von {len(self.place.labels)} Tags").is_visible())
+        walker.see(self.row_of(walker, self.place.labels[-1]).is_visible)
+
+    def headcount(self, walker: Walker) -> None:
+        walker.click(walker.page.get_by_role("heading", name="Zonen", exact=True))
+        walker.click(walker.button("Wer ist wo"))
+        walker.see(lambda: walker.page.get_by_text("In keiner Zone").locator("visible=true").count())
+
+    def anchor(self, walker: Walker) -> None:
+        site = self.place.bench.answers.site
+        walker.click(walker.button("Anker einrichten"))
+        x, y = walker.page.evaluate("dropanchor.anchors()[0].pixel")
+        walker.drag((x, y), (x + 40, y))
+        walker.click(walker.button("^Verschieben"))
+        walker.see(lambda: site.site.anchors[0].x != 0)
+        walker.click(walker.button("^Rückgängig"))
+        walker.see(lambda: site.site.anchors[0].x == 0)
+
+    def anchor_on_phone(self, walker: Walker) -> None:
+        walker.click(walker.button("Werkzeuge"))
+        self.anchor(walker)
