@@ -38,7 +38,7 @@ examples:
 EXIT_FOUND = 1
 REFUSED = (RefusedError,)
 CLOCK_S = 2.0
-PAST_S = 330.0  # longer than a busy service takes at most to run a moment of the past again
+PAST_S = 330.0  # more than RUN_S of `blackbox/box.py`, for which a service runs a moment of the past again at most
 DAY_NS = 86_400_000_000_000
 FEW_RANGES = 10  # a share of fewer tells nothing
 MOST = 0.5

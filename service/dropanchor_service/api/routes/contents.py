@@ -23,13 +23,19 @@ LINES: dict[int | str, Any] = {200: {"content": {"application/jsonl": TEXT, "tex
 
 
 def lines_response(
-    name: str, pages: Iterator[list[Any]], to_csv: Callable[[Iterable[Any]], Iterator[bytes]] | None
+    name: str,
+    pages: Iterator[list[Any]],
+    to_csv: Callable[[Iterable[Any]], Iterator[bytes]] | None,
+    encoded: Callable[[Any], bytes] = to_json,
 ) -> StreamingResponse:
-    """Return the entries of all pages as CSV or, without `to_csv`, as JSON lines. Raises what the first page raises."""
+    """Return the entries of all pages as CSV or, without `to_csv`, as JSON lines. Raises what the first page raises.
+
+    encoded: returns an entry as JSON.
+    """
     entries = chain(next(pages), chain.from_iterable(pages))
     if to_csv is not None:
         return file_response(to_csv(entries), f"{name}.csv", "text/csv")
-    return file_response((to_json(entry) + b"\n" for entry in entries), f"{name}.jsonl", "application/jsonl")
+    return file_response((encoded(entry) + b"\n" for entry in entries), f"{name}.jsonl", "application/jsonl")
 
 
 def file_response(content: Iterable[bytes], name: str, media_type: str) -> StreamingResponse:

@@ -4,7 +4,7 @@ import asyncio
 import re
 import sqlite3
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from threading import Event as ThreadEvent
@@ -146,16 +146,20 @@ def list_events(query: Annotated[EventQuery, Query()], request: Request) -> Resp
 )
 def get_events_file(query: Annotated[EventFileQuery, Query()], request: Request) -> Response:
     pages = _pages(parts_of(request).events.store, query)
-    return lines_response("events", pages, events_csv if query.format == "csv" else None)
+    return lines_response("events", pages, _as_csv if query.format == "csv" else None, encoded=bytes)
 
 
-def _pages(store: EventStore, query: EventFileQuery) -> Iterator[list[Any]]:
+def _as_csv(bodies: Iterable[bytes]) -> Iterator[bytes]:
+    return events_csv(map(orjson.loads, bodies))
+
+
+def _pages(store: EventStore, query: EventFileQuery) -> Iterator[list[bytes]]:
     """Yield all events, page by page. Raises ProblemError."""
     position, selection = query.position() or 0, query.selection()
     while True:
         with reading():
             found = store.after(position, MAX_EVENTS, selection)
-        yield [orjson.loads(event.body) for event in found]
+        yield [event.body for event in found]
         if len(found) < MAX_EVENTS:
             return
         position = found[-1].sequence
