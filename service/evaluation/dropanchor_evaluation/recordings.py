@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from dropanchor_evaluation.baselines import stays, walks
-from dropanchor_evaluation.operator_knowledge import BEATEN, PROTOTYPE, apply_operator_knowledge, family_of
+from dropanchor_evaluation.operator_knowledge import BEATEN, apply_operator_knowledge, family_of
 from dropanchor_evaluation.paper.engines import engines
 from dropanchor_evaluation.parallel import Workers
 from dropanchor_evaluation.report import Cell, Section, Table
@@ -141,8 +141,7 @@ def section(found: dict[str, Results]) -> Section:
             "Start and heading zero are given; range bias, mounting angle and noise are not taken from the truth. "
             "Configured, as an operator could: a top speed; Plaza: the scale of its radios, 1.069, and 0.6 m; the "
             "mower: an IMU along its wheels; starloc: a rig held 0.6 m in front of the walker; "
-            "Hanyang: a heading that is the direction of travel. Prototype: a Gaussian-sum "
-            "filter whose parameters were searched for per family on these very recordings. Heading: that of each "
+            "Hanyang: a heading that is the direction of travel; cf: that it flies in any direction. Heading: that of each "
             "engine's own attitude filter where the recording has an IMU, else that of the platform (Plaza's drifts "
             "by 0.3 °/s). Tuned: the service's tuned parameters, the same for all; their speed estimator wants ranges "
             "that change by 2 m on a line, so it says nothing in small rooms. Steps and compass: 0.65 m a step along "
@@ -191,7 +190,6 @@ def _by_sequence(found: dict[str, Results], measure: str) -> Table:
             *ESTIMATORS,
             "fleet's 95 % ellipses cover",
             "fleet is `tracking`",
-            "prototype's RMSE",
         ],
         [
             [
@@ -200,7 +198,6 @@ def _by_sequence(found: dict[str, Results], measure: str) -> Table:
                 *(cell(results, estimator) for estimator in ESTIMATORS),
                 share(results, "coverage"),
                 share(results, "tracking"),
-                _prototype(name),
             ]
             for name, results in found.items()
         ],
@@ -232,10 +229,6 @@ def _beaten(found: dict[str, Results]) -> Table:
         ["sequence", "the best one", "its RMSE", "fleet", "why"],
         rows,
     )
-
-
-def _prototype(name: str) -> str:
-    return "{:.2f} ({:.2f})".format(*PROTOTYPE[name]) if name in PROTOTYPE else ""
 
 
 def _by_anchor(found: dict[str, Results]) -> Table:
