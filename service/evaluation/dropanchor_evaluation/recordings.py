@@ -140,13 +140,13 @@ def section(found: dict[str, Results]) -> Section:
         text=[
             "Start and heading zero are given; range bias, mounting angle and noise are not taken from the truth. "
             "Configured, as an operator could: a top speed; Plaza: the scale of its radios, 1.069, and 0.6 m; the "
-            "mower: an IMU along its wheels; starloc: a rig held 0.6 m in front of the walker; "
-            "Hanyang: a heading that is the direction of travel; cf: that it flies in any direction. Heading: that of "
-            "each engine's own attitude filter where the recording has an IMU, else that of the platform (Plaza's drifts "
-            "by 0.3 °/s). Tuned: the service's tuned parameters, the same for all; their speed estimator wants ranges "
-            "that change by 2 m on a line, so it says nothing in small rooms. Steps and compass: 0.65 m a step along "
-            "the tilt-compensated compass, corrected by the ranges. RMSE is without any alignment. The "
-            "engine fleet was developed on recordings of this kind: a development set, not a blind test.",
+            "mower: an IMU along its wheels; starloc: a rig held 0.6 m in front of the walker; Hanyang: a heading "
+            "that is the direction of travel; cf: that it flies in any direction. Heading: that of each engine's own "
+            "attitude filter where the recording has an IMU, else that of the platform (Plaza's drifts by 0.3 °/s). "
+            "Tuned: the service's tuned parameters, the same for all; their speed estimator wants ranges that change "
+            "by 2 m on a line, so it says nothing in small rooms. Steps and compass: 0.65 m a step along the "
+            "tilt-compensated compass, corrected by the ranges. RMSE is without any alignment. The engine fleet was "
+            "developed on recordings of this kind: a development set, not a blind test.",
         ],
         tables=[_by_sequence(found, "RMSE"), _beaten(found), _by_sequence(found, "ATE"), _by_anchor(found)]
         if found
